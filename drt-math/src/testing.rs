@@ -70,7 +70,7 @@ pub fn rectangle_chi_square(
     high: [f64; 2],
     pdf: impl Fn([f64; 2]) -> f64,
 ) -> f64 {
-    Grid { low, high, cells: [24, 24], pieces: [8, 8] }.test(samples.into_iter(), pdf)
+    Grid { low, high, cells: [24, 24], pieces: [4, 4] }.test(samples.into_iter(), pdf)
 }
 
 /// Chi-square test of unit vectors against a density in solid angle; the p-value. As for
@@ -80,7 +80,7 @@ pub fn sphere_chi_square(
     pdf: impl Fn(Vec3) -> f64,
 ) -> f64 {
     // The map to (z, azimuth) preserves areas.
-    let grid = Grid { low: [-1.0, -PI], high: [1.0, PI], cells: [24, 32], pieces: [8, 8] };
+    let grid = Grid { low: [-1.0, -PI], high: [1.0, PI], cells: [24, 32], pieces: [4, 4] };
     grid.test(samples.into_iter().map(|w| [w.z, fm::atan2(w.y, w.x)]), |[z, phi]| {
         let r = fm::sqrt(1.0 - z * z);
         pdf(vec3(r * fm::cos(phi), r * fm::sin(phi), z))

@@ -15,7 +15,7 @@ use drt_motion::{GeometryChange, Parameter};
 
 /// Evaluations, and samples of each pixel in one.
 const SEEDS: u64 = 64;
-const SPP: u32 = 512;
+const SPP: u32 = 192;
 
 fn settings() -> Settings {
     Settings::default()
@@ -46,8 +46,8 @@ fn turned(value: f64) -> Parameter {
     parameter("turned", value, vec![moves("ball", turn)])
 }
 
-/// How far the gradient by a group along a direction is from that by a parameter with this effect, in standard errors, and how well it
-/// is known; then with the coordinates of the direction changed.
+/// How far the gradient by a group along a direction is from that by a parameter with this effect, in standard errors of the difference between
+/// both by the same samples, and what such an error is as a part of the gradient; then with the coordinates of the direction changed.
 fn compare(
     scene: &Scene,
     group: Group,
@@ -70,15 +70,18 @@ fn compare(
     let [mut own, mut faulty, mut other] = [(); 3].map(|()| Moments::default());
     for seed in 0..SEEDS {
         let seen = groups.evaluate(&values, SPP, seed, &Unattended).expect("valid").expect("seen");
-        own.push(along(&seen, direction));
-        faulty.push(along(&seen, wrong));
+        let [right, turned] = [direction, wrong].map(|direction| along(&seen, direction));
         let with: Vec<f64> = core::iter::once(0.0).chain(values.iter().copied()).collect();
-        let seen = parameters.evaluate(&with, SPP, 1000 + seed, &Unattended);
-        other.push(seen.expect("valid").expect("seen").gradient()[0]);
+        let seen = parameters.evaluate(&with, SPP, seed, &Unattended);
+        let expected = seen.expect("valid").expect("seen").gradient()[0];
+        own.push(right - expected);
+        faulty.push(turned - expected);
+        other.push(expected);
     }
-    [own, faulty].map(|own| {
-        let error = f64::sqrt(own.variance_of_mean() + other.variance_of_mean());
-        [(own.mean() - other.mean()) / error, error / other.mean().abs()]
+    let size = other.mean().abs();
+    [own, faulty].map(|differences| {
+        let error = differences.standard_error();
+        [differences.mean() / error, error / size]
     })
 }
 

@@ -13,6 +13,9 @@ use crate::reference::{self, Reference, Wanted};
 /// Samples per pixel of the first round.
 const ROUND: u32 = 1 << 10;
 
+/// Samples per pixel that tell whether two ways are the same.
+const FEW: u32 = 1 << 5;
+
 /// Rms z at which what is wrong has shown.
 const CLEAR: f64 = 2.0;
 
@@ -52,7 +55,7 @@ pub struct Finding {
     pub name: &'static str,
     /// Relative noise asked for.
     pub limit: f64,
-    /// The right ways, the first of which the others are compared with.
+    /// The right ways, the first of which the others are compared with, without those that are the same as the first.
     pub right: Vec<Verdict>,
     /// The wrong ones.
     pub wrong: Vec<Verdict>,
@@ -143,7 +146,11 @@ pub fn examine(case: &Case, noise: f64, samples: u32, known: &[Reference]) -> Re
     let mut own: Option<Layer> = None;
     let mut non_finite = 0;
     // Other random numbers for each, so that their errors are independent.
+    let by_plan = case.right.first().map(|way| few(case, way)).transpose()?;
     for (seed, way) in (1..).zip(&case.right) {
+        if seed > 1 && by_plan.as_ref() == Some(&few(case, way)?) {
+            continue;
+        }
         let mut run = Run::new(case, way, seed).map_err(|e| fail(way, e))?;
         while run.noise() > noise && run.samples < samples {
             run.go_on(noise, samples);
@@ -199,6 +206,13 @@ fn differences_verdict(found: &Reference, first: &Layer) -> Verdict {
     }
 }
 
+/// What few samples show by a way. Another one with the same bits is the same way by another name.
+fn few(case: &Case, way: &Way) -> Result<Vec<Estimate>> {
+    let mut run = Run::prepared(case, way, 0).map_err(|e| format!("{}: {e}", way.name))?;
+    run.sample(FEW);
+    Ok(run.layer.blocks)
+}
+
 /// A layer with the blocks in which another sees something.
 fn seen(layer: &Layer, by: &Layer) -> Layer {
     let pairs = layer.blocks.iter().zip(&by.blocks);
@@ -234,14 +248,22 @@ struct Run {
 
 impl Run {
     fn new(case: &Case, way: &Way, seed: u64) -> std::result::Result<Self, drt_estimators::Error> {
+        let mut run = Self::prepared(case, way, seed)?;
+        run.sample(ROUND);
+        Ok(run)
+    }
+
+    fn prepared(
+        case: &Case,
+        way: &Way,
+        seed: u64,
+    ) -> std::result::Result<Self, drt_estimators::Error> {
         let insides = way.insides.clone();
         let settings = Settings { threads: 1, seed, insides, ..Settings::default() };
         let start = Instant::now();
         let session = Session::new(&case.scene, std::slice::from_ref(&way.parameter), &settings)?;
         let layer = session.rendering().image;
-        let mut run = Self { session, start, layer, samples: 0, non_finite: 0 };
-        run.sample(ROUND);
-        Ok(run)
+        Ok(Self { session, start, layer, samples: 0, non_finite: 0 })
     }
 
     fn sample(&mut self, count: u32) {

@@ -4,8 +4,8 @@ use std::fmt;
 use std::time::Instant;
 
 use drt_estimators::{
-    Agreement, Derivative, EstimatorKind, Layer, PathSampling, Rendering, Session, Settings, Term,
-    Unattended, agreement,
+    Agreement, Derivative, Estimate, EstimatorKind, Layer, PathSampling, Rendering, Session,
+    Settings, Term, Unattended, agreement,
 };
 use drt_motion::Parameter;
 
@@ -17,6 +17,9 @@ use crate::reference::Reference;
 
 /// Samples per pixel of the first round. There are two at least: they are [compared](Scale) by halves.
 const ROUND: u32 = 1 << 6;
+
+/// Samples per pixel that tell whether two methods are the same.
+const FEW: u32 = 1 << 4;
 
 /// What each of two estimates may be off by where their scale may be by 1, and a little less: weights that suit
 /// both are not the best of either.
@@ -179,7 +182,7 @@ pub struct Examined {
 }
 
 /// Samples a stage by path space, as long as the stage says, and by each of some `methods`, and judges all by finite differences
-/// and the `methods` also by path space. What fails is [measured once more](compare).
+/// and the `methods` also by path space. What fails is [measured once more](compare). A method that is the same as one before it is passed over.
 ///
 /// # Errors
 /// When the library rejects the scene or a parameter.
@@ -205,7 +208,10 @@ pub fn examine(
         let run = |seed| sample(stage, &parameters, Method::REFERENCE, seed, longest);
         let path_space = run(effort.seed + 7)?;
         found.rows.extend(rows(Method::REFERENCE, &path_space));
-        for method in methods {
+        for (k, method) in methods.iter().enumerate() {
+            if is_among(*method, &methods[..k], stage, &parameters)? {
+                continue;
+            }
             let run = |effort: Effort| -> Result<(Vec<Row>, Vec<Pair>)> {
                 let own = sample(stage, &parameters, *method, effort.seed + 19, effort)?;
                 Ok((rows(*method, &own), pairs_of(stage.name, *method, &own, &path_space)))
@@ -220,6 +226,27 @@ pub fn examine(
         }
     }
     Ok(found)
+}
+
+/// Whether a method is the same as one of some others: where lights are points or directions, one estimator may leave all that it could do
+/// otherwise to terms that the other has, too, and samples have the same bits by both.
+fn is_among(
+    method: Method,
+    others: &[Method],
+    stage: &Stage,
+    parameters: &[Parameter],
+) -> Result<bool> {
+    let by = |method: Method| -> Result<Vec<Vec<Estimate>>> {
+        let mut session = method.session(stage, parameters, 0)?;
+        session.run(FEW, &Unattended);
+        Ok(session.rendering().derivatives.into_iter().map(|d| d.total.pixels).collect())
+    };
+    for other in others {
+        if by(method)? == by(*other)? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// The comparisons of all derivatives that two estimators have sampled.

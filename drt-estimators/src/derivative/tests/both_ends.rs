@@ -1,9 +1,7 @@
 //! Derivatives by paths from both ends are those from the camera, and need what the camera sees of light paths and the weights of all
 //! strategies.
 
-use drt_math::stats::Moments;
-
-use crate::derivative::tests::choice::{LIGHT, parts, prepare_by, total};
+use crate::derivative::tests::choice::{LIGHT, Sum, parts, prepare_by, total};
 use crate::derivative::tests::scenes::*;
 use crate::model::settings::EstimatorKind::{PathSpace, Warped};
 use crate::model::settings::{PathSampling, Settings};
@@ -19,22 +17,19 @@ fn every_strategy_and_its_weight_are_needed() {
             let settings = Settings { estimator, sampling, ..Settings::default() };
             prepare_by(&settings, mask, &scene, &brightens, 5)
         };
-        let one = parts(LIGHT, &by(PathSampling::Unidirectional));
-        let both = parts(LIGHT, &by(PathSampling::Bidirectional));
+        let sum = Sum { samples: 64, ..LIGHT };
+        let one = parts(sum, &by(PathSampling::Unidirectional));
+        let both = parts(sum, &by(PathSampling::Bidirectional));
         let reference = total(&one, &one);
-        let judged = |own: Moments| {
-            let error = f64::sqrt(own.variance_of_mean() + reference.variance_of_mean());
-            ((own.mean() - reference.mean()) / error, error / reference.mean().abs())
-        };
-        let fair = judged(total(&both, &both));
+        let fair = total(&both, &both).off(&reference);
         assert!(fair.0.abs() < 4.0 && fair.1 < 0.02, "{estimator:?} {fair:?}");
         let mut camera_alone = by(PathSampling::Bidirectional);
         camera_alone.0.terms.sources.retain(|s| *s != BoundarySource::LightPaths);
-        let camera_alone = parts(LIGHT, &camera_alone);
-        let without = judged(total(&camera_alone, &camera_alone));
+        let camera_alone = parts(sum, &camera_alone);
+        let without = total(&camera_alone, &camera_alone).off(&reference);
         assert!(without.0.abs() > 5.0, "{estimator:?} {without:?}");
         // Paths from the camera that know nothing of light paths, with all that the camera sees of these.
-        let unweighted = judged(total(&one, &both));
+        let unweighted = total(&one, &both).off(&reference);
         assert!(unweighted.0.abs() > 5.0, "{estimator:?} {unweighted:?}");
     }
 }

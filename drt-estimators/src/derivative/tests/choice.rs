@@ -83,14 +83,15 @@ pub(crate) struct Sum {
     pub(crate) weight: fn(u32) -> f64,
     /// Per pixel and batch.
     pub(crate) samples: u32,
+    /// At most 48.
+    pub(crate) batches: u64,
 }
 
 /// The light's moment across the image: some columns gain what others lose.
-pub(crate) const MOMENT: Sum =
-    Sum { weight: |pixel| f64::from(pixel % FILM[0]) - 2.5, samples: 128 };
+pub(crate) const MOMENT: Sum = Sum { weight: |pixel| f64::from(pixel % FILM[0]) - 2.5, ..LIGHT };
 
 /// All of it.
-pub(crate) const LIGHT: Sum = Sum { weight: |_| 1.0, samples: 128 };
+pub(crate) const LIGHT: Sum = Sum { weight: |_| 1.0, samples: 128, batches: BATCHES };
 
 /// The derivative of a sum by batches of samples: the interior term, and all others.
 pub(crate) struct Parts {
@@ -99,11 +100,11 @@ pub(crate) struct Parts {
 }
 
 pub(crate) fn parts(
-    Sum { weight, samples }: Sum,
+    Sum { weight, samples, batches }: Sum,
     (prepared, motion): &(Prepared, Motion),
 ) -> Parts {
     let mut parts = Parts { rays: Vec::new(), edges: Vec::new() };
-    for seed in 0..BATCHES {
+    for seed in 0..batches {
         let [mut rays, mut edges] = [0.0; 2];
         let component = prepared.component(Contraction::new(&prepared.world, motion));
         let terms = &prepared.terms;
@@ -138,12 +139,37 @@ pub(crate) fn parts(
 }
 
 /// The interior term of one, and all others of another.
-pub(crate) fn total(rays: &Parts, edges: &Parts) -> Moments {
-    rays.rays.iter().zip(&edges.edges).map(|(rays, edges)| rays + edges).collect()
+pub(crate) fn total(rays: &Parts, edges: &Parts) -> Batches {
+    Batches(rays.rays.iter().zip(&edges.edges).map(|(rays, edges)| rays + edges).collect())
+}
+
+/// A derivative by batches of samples. A batch takes the same random numbers in each estimate, so that much of the noise of two of them is
+/// common to both, and their difference is known better than either.
+#[derive(Clone, Debug)]
+pub(crate) struct Batches(Vec<f64>);
+
+impl Batches {
+    /// A derivative that is known.
+    pub(crate) fn exact(value: f64) -> Self {
+        Self(vec![value; BATCHES as usize])
+    }
+
+    /// The mean of all batches.
+    pub(crate) fn mean(&self) -> f64 {
+        self.0.iter().sum::<f64>() / self.0.len() as f64
+    }
+
+    /// How many standard errors its mean is above that of a reference by the same batches, and what a standard error is over the reference.
+    pub(crate) fn off(&self, reference: &Self) -> (f64, f64) {
+        let pairs = self.0.iter().zip(&reference.0);
+        let differences: Moments = pairs.map(|(own, other)| own - other).collect();
+        let error = differences.standard_error();
+        (differences.mean() / error, error / reference.mean().abs())
+    }
 }
 
 /// The derivative of a sum, by all terms of a scene that has been prepared.
-pub(crate) fn derivative(sum: Sum, prepared: &(Prepared, Motion)) -> Moments {
+pub(crate) fn derivative(sum: Sum, prepared: &(Prepared, Motion)) -> Batches {
     let parts = parts(sum, prepared);
     total(&parts, &parts)
 }
@@ -182,11 +208,7 @@ impl<'a> BoundarySink for Total<'a> {
 pub(crate) fn check(sum: Sum, prepare: &dyn Fn(f64) -> (Prepared, Motion)) {
     let [one, none, three] = [1.0, 0.0, 3.0].map(|strength| parts(sum, &prepare(strength)));
     let reference = total(&one, &one);
-    let compare = |(rays, edges)| {
-        let m = total(rays, edges);
-        let error = f64::sqrt(m.variance_of_mean() + reference.variance_of_mean());
-        ((m.mean() - reference.mean()) / error, error / reference.mean())
-    };
+    let compare = |(rays, edges)| total(rays, edges).off(&reference);
     let alike = [(&none, &none), (&three, &three)].map(compare);
     assert!(alike.iter().all(|(z, _)| z.abs() < 4.0), "{alike:?}");
     let unlike = compare((&three, &none));

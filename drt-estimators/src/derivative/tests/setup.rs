@@ -112,9 +112,23 @@ pub(super) fn trace_with<'w>(
 ) -> [f64; 2] {
     let pixels = FILM[0] * FILM[1];
     let mut rng = Rng::new(seed, u64::from(i % pixels), i / pixels);
-    let view = tracer.world.camera.sample_view(i % pixels, rng.next_2d(), true);
+    let place = rng.next_2d();
+    trace_at(tracer, recording, probes, pairs, i % pixels, place, rng)
+}
+
+/// Traces a path as [`trace_with`] does, through a place in a pixel.
+pub(super) fn trace_at<'w>(
+    tracer: &mut Tracer<'w>,
+    recording: &mut Recording<'w>,
+    probes: Option<&mut Probes>,
+    pairs: Option<Rng>,
+    pixel: u32,
+    place: [f64; 2],
+    rng: Rng,
+) -> [f64; 2] {
+    let view = tracer.world.camera.sample_view(pixel, place, true);
     let weight = Rgb::splat(view.weight);
-    let pixel = [i % pixels % FILM[0], i % pixels / FILM[0]];
+    let pixel = [pixel % FILM[0], pixel / FILM[0]];
     let Recording { record, views } = recording;
     views[0].begin(pairs, || Rng::new(0, 0, 0), || Rng::new(0, 0, 0));
     let mut recorder = Recorder { record, views, camera_ray: None, probes };

@@ -8,6 +8,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::procedural;
+use drt_math::sobol::SobolSampler;
 use drt_math::stats::Moments;
 use drt_math::{Rgb, Rng, Vec3, vec3};
 use drt_motion::{Parameter, SurfacePoint as PointOfMesh};
@@ -16,13 +17,14 @@ use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::tests::scenes::*;
-use crate::derivative::tests::setup::{Recording, motion, prepare, trace};
+use crate::derivative::tests::setup::{Recording, motion, prepare, trace_at};
 use crate::derivative::velocity::{
     Auxiliary, Blend, Found, Material, Moved, Movers, Probe, VelocityField, VertexVelocity,
 };
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
 use crate::run::gradient::ScatterSink;
+use crate::sampling::streams::sequence_name;
 use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
 use crate::world::World;
@@ -118,11 +120,17 @@ fn mist() -> Scene {
     seen(scene, [vec3(0.3, 0.9, 4.0), Vec3::ZERO], 4)
 }
 
-/// Derivatives of the moment of light across the image, path by path; and the largest difference between forward
-/// and reverse mode, over their root mean square.
+const PIXELS: u32 = FILM[0] * FILM[1];
+
+/// How many batches of paths there are. Places in pixels are spread evenly in each.
+const BATCHES: u64 = 64;
+
+/// Derivatives of the moment of light across the image, by the first of all batches, each of so many paths; and the largest difference between
+/// forward and reverse mode, over the root mean square of paths.
 fn derivatives(
     scene: &Scene,
     parameter: &Parameter,
+    batches: u64,
     paths: u32,
     field: &dyn Fn(Material) -> Smooth,
 ) -> (Vec<f64>, f64) {
@@ -132,24 +140,31 @@ fn derivatives(
     let mut tracer = Tracer::new(&world);
     let mut differentiator = Differentiator::new(&world);
     let mut rates = Contraction::new(&world, &motion);
-    let (mut forward, mut apart) = (Vec::new(), 0.0);
-    for i in 0..paths {
-        let slope = trace(&mut tracer, &mut path, None, 31, i);
-        let column = f64::from(path.record.camera_ray.pixel[0]) - 2.5;
-        let rng = Rng::new(6, 0, i);
-        rates.clear();
-        differentiator.differentiate(&path.path(), slope, rng.clone(), &mut rates);
-        let value = rates.rates[0].mean() * column;
-        forward.push(value);
-        if i < 200 {
-            let weights = Rgb::splat(column / 3.0);
-            let mut sink = ScatterSink::of_surfaces(&world, &motion.active, weights);
-            differentiator.differentiate(&path.path(), slope, rng, &mut sink);
-            apart = f64::max(apart, (along(&motion, &world, sink) - value).abs());
+    let (mut forward, mut apart, mut square) = (Vec::new(), 0.0, 0.0);
+    for batch in 0..batches {
+        let mut sum = 0.0;
+        for i in 0..paths {
+            let (pixel, index) = (i % PIXELS, i / PIXELS);
+            let mut places = SobolSampler::new(sequence_name(batch, pixel, 0), index);
+            let place = [places.next_f64(), places.next_f64()];
+            let rng = Rng::new(31 + batch, u64::from(pixel), index);
+            let slope = trace_at(&mut tracer, &mut path, None, None, pixel, place, rng);
+            let column = f64::from(path.record.camera_ray.pixel[0]) - 2.5;
+            let rng = Rng::new(6, batch, i);
+            rates.clear();
+            differentiator.differentiate(&path.path(), slope, rng.clone(), &mut rates);
+            let value = rates.rates[0].mean() * column;
+            (sum, square) = (sum + value, square + value * value);
+            if batch == 0 && i < 200 {
+                let weights = Rgb::splat(column / 3.0);
+                let mut sink = ScatterSink::of_surfaces(&world, &motion.active, weights);
+                differentiator.differentiate(&path.path(), slope, rng, &mut sink);
+                apart = f64::max(apart, (along(&motion, &world, sink) - value).abs());
+            }
         }
+        forward.push(sum / f64::from(paths));
     }
-    let square: f64 = forward.iter().map(|v| v * v).sum();
-    (forward, apart / f64::sqrt(square / f64::from(paths)))
+    (forward, apart / f64::sqrt(square / (batches as f64 * f64::from(paths))))
 }
 
 /// A scattered gradient along the velocities of the one parameter.
@@ -170,15 +185,16 @@ fn check(
     reverse: bool,
 ) {
     let none = |material| Smooth { window: |_| (0.0, Vec3::ZERO), ..smooth(material, 1.0) };
-    let (material, transposed) = derivatives(scene, parameter, paths, &none);
+    let (material, transposed) = derivatives(scene, parameter, BATCHES, paths, &none);
     assert!(!reverse || transposed < 1e-12, "{transposed}");
-    let difference = |paths: u32, divergence: f64| {
-        let (own, transposed) = derivatives(scene, parameter, paths, &|m| smooth(m, divergence));
+    let difference = |batches: u64, divergence: f64| {
+        let field = |material| smooth(material, divergence);
+        let (own, transposed) = derivatives(scene, parameter, batches, paths, &field);
         assert!(!reverse || transposed < 1e-12, "{transposed}");
         own.iter().zip(&material).map(|(a, b)| a - b).collect::<Moments>()
     };
     // What is planted is so large that a part of the paths shows it.
-    let (fair, faulty) = (difference(paths, 1.0), difference(paths / 16, 0.0));
+    let (fair, faulty) = (difference(BATCHES, 1.0), difference(BATCHES / 16, 0.0));
     let error = fair.standard_error();
     println!("{}: {} {} ± {error}", parameter.name, fair.mean(), faulty.mean());
     assert!(fair.mean().abs() < 4.0 * error && fair.variance() > 0.0, "{fair:?}");
@@ -196,7 +212,13 @@ fn surfaces_may_slide_within_themselves() {
         window: |x| window(x, 4.0, &[0, 2]),
         divergence,
     };
-    check(&scene, &motion("floor", "wobble", wobble(&scene, "floor", 3)), 4_000_000, &field, true);
+    check(
+        &scene,
+        &motion("floor", "wobble", wobble(&scene, "floor", 3)),
+        256 * PIXELS,
+        &field,
+        true,
+    );
 }
 
 /// Their insides have no vertices to which reverse mode would scatter.
@@ -209,5 +231,5 @@ fn insides_may_move_as_they_like() {
         window: |x| window(x, 1.4, &[0, 1, 2]),
         divergence,
     };
-    check(&mist(), &motion("room", "stretch", stretch()), 400_000, &field, false);
+    check(&mist(), &motion("room", "stretch", stretch()), 64 * PIXELS, &field, false);
 }

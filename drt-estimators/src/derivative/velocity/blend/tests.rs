@@ -134,7 +134,7 @@ fn check_medium(sum: Sum, change: GeometryChange) {
 
 /// Weights of three strengths.
 fn check(facets: bool) {
-    choice::check(MOMENT, &|strength| {
+    choice::check(Sum { samples: 64, ..MOMENT }, &|strength| {
         let (mut prepared, motion) = prepare(facets);
         prepared.change_spatial(|s| {
             let Blends { curvatures, camera_cosines, .. } = &mut s.blends;

@@ -8,7 +8,7 @@ use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
 
 use crate::derivative::tests::choice;
-use crate::derivative::tests::choice::MOMENT;
+use crate::derivative::tests::choice::Sum;
 use crate::derivative::tests::scenes::{
     SceneBuilder, ShapeBuilder, ball, diffuse, homogeneous, moves, parameter, placed, seen, shift,
 };
@@ -17,6 +17,8 @@ use crate::derivative::velocity::warp::{Stretch, SurfaceHit, warps};
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
 use crate::world::vertex::SurfacePoint;
+
+const MOMENT: Sum = Sum { samples: 48, ..choice::MOMENT };
 
 fn hit(distance: f64, cosine: f64) -> SurfaceHit {
     let up = vec3(0.0, 0.0, 1.0);
@@ -159,9 +161,8 @@ fn what_is_followed_stands_for_all() {
         prepared.change_spatial(|s| s.free_paths.clear());
         choice::derivative(MOMENT, &(prepared, motion))
     });
-    let error = f64::sqrt(all.variance_of_mean() + few.variance_of_mean());
-    assert!((all.mean() - few.mean()).abs() < 4.0 * error, "{all:?} {few:?}");
-    assert!(error < 0.15 * all.mean().abs(), "{all:?} {few:?}");
+    let (z, error) = few.off(&all);
+    assert!(z.abs() < 4.0 && error < 0.15, "{z} {error}");
 }
 
 #[test]

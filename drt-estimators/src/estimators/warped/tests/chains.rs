@@ -43,7 +43,7 @@ const ALL: [Fault; 4] = [Fault::Divergence, Fault::Sign, Fault::Weight, Fault::D
 
 #[test]
 fn what_moves_in_a_mirror() {
-    let sum = Sum { samples: 128, ..MOMENT };
+    let sum = Sum { samples: 96, ..MOMENT };
     let by = vec3(0.5, 0.3, 0.4);
     let there = vec3(by.x, by.y, -by.z);
     let [mirrored, direct] = [by, there].map(|by| one("block", GeometryChange::Translate(by)));
@@ -53,9 +53,9 @@ fn what_moves_in_a_mirror() {
 /// As it moves what is seen in it moves twice as far, and as it turns by twice the angle.
 #[test]
 fn a_mirror_moves() {
-    let sum = Sum { samples: 128, ..MOMENT };
+    let sum = Sum { samples: 64, ..MOMENT };
     let forward = |by: f64| GeometryChange::Translate(Vec3::Z * by);
-    let light = Sum { samples: 128, ..LIGHT };
+    let light = Sum { samples: 64, ..LIGHT };
     compare_mirrored(&one("mirror", forward(1.0)), &one("block", forward(2.0)), light, &[]);
     let (axis, pivot) = (Vec3::Y, vec3(0.0, 0.0, PLACE));
     let turns = one("mirror", GeometryChange::Rotate { axis, pivot });
@@ -65,7 +65,7 @@ fn a_mirror_moves() {
 
 #[test]
 fn the_camera_moves_before_a_mirror() {
-    let sum = Sum { samples: 128, ..MOMENT };
+    let sum = Sum { samples: 96, ..MOMENT };
     let change = || GeometryChange::Translate(vec3(0.5, 0.3, 0.4));
     compare_mirrored(&one("camera", change()), &one("camera", change()), sum, &[Fault::Direction]);
 }

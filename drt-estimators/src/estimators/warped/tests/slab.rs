@@ -121,7 +121,7 @@ fn a_lamp_behind_a_slab() {
     for (effect, later, faults) in cases {
         let step = 1e-3;
         let difference = later(step).moment() - later(-step).moment();
-        let reference = [difference / (2.0 * step); 2].into_iter().collect();
+        let reference = Batches::exact(difference / (2.0 * step));
         let motion = parameter(&effect.target.clone(), 0.0, alloc::vec![effect]);
         let by = |kind| prepare_lit(kind, EmitterMask::Extended, &scene, &motion, 3);
         assert_found(&reference, sum, || by(EstimatorKind::Warped), faults);

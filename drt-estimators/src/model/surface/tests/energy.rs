@@ -1,12 +1,18 @@
 use core::f64::consts::PI;
 
 use drt_math::Moments;
+use drt_math::sobol::SobolSampler;
 use drt_math::testing::{welch_z, z_score};
+use drt_math::warp::uniform_sphere;
 
 use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
 use crate::model::surface::tests::*;
 
 const SAMPLES: u32 = 40_000;
+
+/// Batches of evenly spread directions, and how many directions each one has.
+const BATCHES: u32 = 40;
+const BATCH: u32 = 1 << 11;
 
 /// Index on a direction's side over that of the exterior.
 pub(super) fn index(bsdf: &Bsdf, w: Vec3) -> f64 {
@@ -33,14 +39,17 @@ fn sampled(bsdf: &Bsdf, wo: Vec3, factor: impl Fn(Vec3) -> f64) -> Moments {
     sum
 }
 
-/// The integral over `wi` of the green value by directions spread evenly.
+/// The integral over `wi` of the green value by directions spread evenly, in batches that are spread evenly each.
 fn spread(bsdf: &Bsdf, wo: Vec3) -> Moments {
-    let mut rng = Rng::new(22, 0, 0);
-    let mut sum = Moments::default();
-    for _ in 0..10 * SAMPLES {
-        sum.push(bsdf.eval(wo, random_direction(&mut rng), normal()).g * (4.0 * PI));
-    }
-    sum
+    let batch = |seed: u32| {
+        let value = |index: u32| {
+            let mut point = SobolSampler::new(seed, index);
+            let wi = uniform_sphere([point.next_f64(), point.next_f64()]);
+            bsdf.eval(wo, wi, normal()).g
+        };
+        (0..BATCH).map(value).sum::<f64>() * (4.0 * PI) / f64::from(BATCH)
+    };
+    (0..BATCHES).map(batch).collect()
 }
 
 #[test]
