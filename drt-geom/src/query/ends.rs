@@ -41,19 +41,20 @@ pub(super) struct End {
 
 impl End {
     /// The origin, as given.
-    #[inline]
+    #[inline(always)]
     pub(super) fn origin(origin: [f64; 3]) -> Self {
         Self::with_error(origin, [0.0; 3])
     }
 
     /// A point with an error of its own.
-    #[inline]
+    #[inline(always)]
     pub(super) fn with_error(point: [f64; 3], error: [f64; 3]) -> Self {
         let largest = |v: [f64; 3]| v[0].abs().max(v[1].abs()).max(v[2].abs());
         Self { point, error, beside: BESIDE * largest(point) + largest(error) }
     }
 
     /// The point `origin + t dir`, whose terms were rounded, `dir` perhaps by a subtraction.
+    #[inline(always)]
     pub(super) fn far(origin: [f64; 3], dir: [f64; 3], t: f64) -> Self {
         let error = |k: usize| gamma(4.0) * (origin[k].abs() + (t * dir[k]).abs());
         let point = [0, 1, 2].map(|k| origin[k] + t * dir[k]);
@@ -65,7 +66,7 @@ impl End {
     /// `leaving` is the direction away from the end along the ray. Right at the triangle the sign of
     /// a computed hit distance is less certain than that of the end's distance to the plane, so an
     /// end from which the ray moves off the plane counts too.
-    #[inline]
+    #[inline(always)]
     pub(super) fn lies_on(&self, triangle: &Corners, leaving: [f64; 3]) -> bool {
         let mut slack = [0.0; 3];
         for k in 0..3 {

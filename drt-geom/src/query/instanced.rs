@@ -230,7 +230,7 @@ impl Instances {
         let mut far = end(&best);
         self.visit(&Ray { t_max: far, ..*ray }, |p| {
             let (local, skip, ends) = p.probe(ray, far, skip);
-            if let Some(hit) = p.tree.closest_from(&local, skip, ends).map(|hit| p.named(hit))
+            if let Some(hit) = p.tree.closest_from(&local, skip, Some(ends)).map(|hit| p.named(hit))
                 && best.is_none_or(|b| hit.is_before(&b))
             {
                 best = Some(hit);
@@ -245,7 +245,7 @@ impl Instances {
         let mut blocked = false;
         self.visit(ray, |p| {
             let (local, skip, ends) = p.probe(ray, ray.t_max, skip);
-            blocked = p.tree.any_from(&local, skip, ends, |prim| blocks(p.first + prim));
+            blocked = p.tree.any_from(&local, skip, Some(ends), |prim| blocks(p.first + prim));
             if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(f64::INFINITY) }
         });
         blocked
@@ -255,7 +255,7 @@ impl Instances {
     fn all(&self, ray: &Ray, mut far: f64, skip: Skip, mut found: impl FnMut(Hit) -> f64) {
         self.visit(&Ray { t_max: far, ..*ray }, |p| {
             let (local, skip, ends) = p.probe(ray, far, skip);
-            p.tree.all_from(&local, skip, ends, |hit| far = found(p.named(hit)));
+            p.tree.all_from(&local, skip, Some(ends), |hit| far = found(p.named(hit)));
             ControlFlow::Continue(far)
         });
     }

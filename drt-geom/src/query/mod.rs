@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use self::block::{Block, Twin, chain};
+use self::block::{Block, Twin};
 use self::ends::End;
 use self::frame::{BoxFrame, BoxRay};
 use self::lanes::{Lanes, Machine, Task};
@@ -69,6 +69,9 @@ pub struct TriangleBvh {
     machine: Machine,
 }
 
+/// The ends of a ray, start and end, where they have rounding errors of their own.
+type Ends = (End, Option<End>);
+
 /// One query's ray in all its forms.
 struct Probe {
     ray: Ray,
@@ -89,18 +92,14 @@ impl TriangleBvh {
     /// The first hit along a ray.
     #[must_use]
     pub fn closest(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
-        self.closest_of(&self.probe(ray, skip)?)
+        self.closest_from(ray, skip, None)
     }
 
-    /// The same of a ray whose ends, start and end, have errors of their own.
-    fn closest_from(&self, ray: &Ray, skip: Skip, ends: (End, Option<End>)) -> Option<Hit> {
-        self.closest_of(&self.probe(ray, skip)?.with_ends(ends))
-    }
-
+    /// The first hit along a ray whose ends may have errors of their own.
     #[inline(always)]
-    fn closest_of(&self, probe: &Probe) -> Option<Hit> {
+    fn closest_from(&self, ray: &Ray, skip: Skip, ends: Option<Ends>) -> Option<Hit> {
         let mut best: Option<(f64, u32, Crossing)> = None;
-        self.visit(probe, |prim, crossing, _| {
+        self.visit(ray, skip, ends, |probe, prim, crossing, _| {
             if best.is_none_or(|(t, p, _)| (crossing.t, prim) < (t, p)) {
                 best = Some((crossing.t, prim, *crossing));
                 return ControlFlow::Continue(probe.boxes.limit(crossing.t));
@@ -114,9 +113,8 @@ impl TriangleBvh {
     /// that on the triangle with the lowest number.
     #[must_use]
     pub fn foremost(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
-        let probe = self.probe(ray, skip)?;
         let mut best = Foremost::default();
-        self.visit(&probe, |prim, crossing, corners| {
+        self.visit(ray, skip, None, |probe, prim, crossing, corners| {
             let nearer = best.take(prim, crossing, corners);
             let limit = if nearer { probe.boxes.limit(crossing.t) } else { f32::INFINITY };
             ControlFlow::Continue(limit)
@@ -127,26 +125,20 @@ impl TriangleBvh {
     /// Whether a triangle that `blocks` meets the ray. `blocks` is asked in no particular order and
     /// no more after it has said yes.
     pub fn any(&self, ray: &Ray, skip: Skip, blocks: impl FnMut(u32) -> bool) -> bool {
-        let Some(probe) = self.probe(ray, skip) else { return false };
-        self.any_of(&probe, blocks)
+        self.any_from(ray, skip, None, blocks)
     }
 
-    /// The same of a ray whose ends have errors of their own.
+    /// Whether a triangle that `blocks` meets a ray whose ends may have errors of their own.
+    #[inline(always)]
     fn any_from(
         &self,
         ray: &Ray,
         skip: Skip,
-        ends: (End, Option<End>),
-        blocks: impl FnMut(u32) -> bool,
+        ends: Option<Ends>,
+        mut blocks: impl FnMut(u32) -> bool,
     ) -> bool {
-        let Some(probe) = self.probe(ray, skip) else { return false };
-        self.any_of(&probe.with_ends(ends), blocks)
-    }
-
-    #[inline(always)]
-    fn any_of(&self, probe: &Probe, mut blocks: impl FnMut(u32) -> bool) -> bool {
         let mut blocked = false;
-        self.visit(probe, |prim, _, _| {
+        self.visit(ray, skip, ends, |_, prim, _, _| {
             blocked = blocks(prim);
             if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(f32::INFINITY) }
         });
@@ -155,19 +147,13 @@ impl TriangleBvh {
 
     /// Calls `visit` with every hit along the ray, in no particular order.
     pub fn all(&self, ray: &Ray, skip: Skip, mut visit: impl FnMut(Hit)) {
-        let Some(probe) = self.probe(ray, skip) else { return };
-        self.all_of(&probe, &mut visit);
+        self.all_from(ray, skip, None, &mut visit);
     }
 
-    /// The same of a ray whose ends have errors of their own.
-    fn all_from(&self, ray: &Ray, skip: Skip, ends: (End, Option<End>), visit: impl FnMut(Hit)) {
-        let Some(probe) = self.probe(ray, skip) else { return };
-        self.all_of(&probe.with_ends(ends), visit);
-    }
-
+    /// Calls `visit` with every hit along a ray whose ends may have errors of their own.
     #[inline(always)]
-    fn all_of(&self, probe: &Probe, mut visit: impl FnMut(Hit)) {
-        self.visit(probe, |prim, crossing, _| {
+    fn all_from(&self, ray: &Ray, skip: Skip, ends: Option<Ends>, mut visit: impl FnMut(Hit)) {
+        self.visit(ray, skip, ends, |_, prim, crossing, _| {
             visit(hit(prim, crossing));
             ControlFlow::Continue(f32::INFINITY)
         });
@@ -183,9 +169,8 @@ impl TriangleBvh {
         out: &mut Vec<Hit>,
     ) -> bool {
         out.clear();
-        let Some(probe) = self.probe(ray, skip) else { return false };
         let mut blocked = false;
-        self.visit(&probe, |prim, crossing, _| {
+        self.visit(ray, skip, None, |_, prim, crossing, _| {
             blocked = blocks(prim);
             if blocked {
                 return ControlFlow::Break(());
@@ -210,9 +195,8 @@ impl TriangleBvh {
         out: &mut Vec<Hit>,
     ) -> Option<Hit> {
         out.clear();
-        let probe = self.probe(ray, skip)?;
         let mut best = Foremost::default();
-        self.visit(&probe, |prim, crossing, corners| {
+        self.visit(ray, skip, None, |probe, prim, crossing, corners| {
             let limit = if !blocks(prim) {
                 out.push(hit(prim, crossing));
                 f32::INFINITY
@@ -252,17 +236,44 @@ impl TriangleBvh {
         Self { machine: Machine::Portable, ..self }
     }
 
-    /// Calls `found` with every hit of the probe. Its answer is where the ray may be cut off, in the
+    /// Calls `found` with every hit of a ray, and with the ray in all its forms. Its answer is where the ray may be cut off, in the
     /// parameter of the probe's box ray.
     #[inline]
     fn visit(
         &self,
-        probe: &Probe,
-        found: impl FnMut(u32, &Crossing, &Corners) -> ControlFlow<(), f32>,
+        ray: &Ray,
+        skip: Skip,
+        ends: Option<Ends>,
+        found: impl FnMut(&Probe, u32, &Crossing, &Corners) -> ControlFlow<(), f32>,
     ) {
-        let Some(tree) = &self.tree else { return };
-        let visitor = Hits { bvh: self, probe, far: probe.boxes.far, found };
-        self.machine.run(Walk { tree, query: &probe.boxes, visitor });
+        self.machine.run(Search { bvh: self, ray, skip, ends, found });
+    }
+}
+
+/// A search for the hits of a ray. All of it is compiled for whichever lanes there are, as preparing the ray takes about as
+/// long as a walk through a small tree.
+struct Search<'a, F> {
+    bvh: &'a TriangleBvh,
+    ray: &'a Ray,
+    skip: Skip,
+    ends: Option<Ends>,
+    found: F,
+}
+
+impl<F: FnMut(&Probe, u32, &Crossing, &Corners) -> ControlFlow<(), f32>> Task for Search<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let Self { bvh, ray, skip, ends, found } = self;
+        let Some(tree) = &bvh.tree else { return };
+        let Some(probe) = bvh.probe(ray, skip) else { return };
+        let probe = match ends {
+            Some(ends) => probe.with_ends(ends),
+            None => probe,
+        };
+        let mut visitor = Hits { bvh, probe: &probe, far: probe.boxes.far, found };
+        tree.walk(lanes, &probe.boxes, &mut visitor);
     }
 }
 
@@ -290,7 +301,7 @@ struct Hits<'a, F> {
     found: F,
 }
 
-impl<F: FnMut(u32, &Crossing, &Corners) -> ControlFlow<(), f32>> Visitor for Hits<'_, F> {
+impl<F: FnMut(&Probe, u32, &Crossing, &Corners) -> ControlFlow<(), f32>> Visitor for Hits<'_, F> {
     #[inline(always)]
     fn announce<L: Lanes>(&self, lanes: L, index: usize) {
         lanes.prefetch(&self.bvh.blocks[index]);
@@ -302,36 +313,34 @@ impl<F: FnMut(u32, &Crossing, &Corners) -> ControlFlow<(), f32>> Visitor for Hit
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize;
             mask &= mask - 1;
-            self.test(block.prims[lane], &block.triangle(lane))?;
-            for twin in chain(&self.bvh.twins, block.twins[lane]) {
-                self.test(twin.prim, &twin.corners)?;
+            // The triangle, then its twins, in one loop: the test is compiled in place, and once.
+            let (mut prim, mut triangle) = (block.prims[lane], block.triangle(lane));
+            let mut next = block.twins[lane];
+            loop {
+                if let Some(crossing) = self.probe.meet(prim, &triangle) {
+                    let limit = (self.found)(self.probe, prim, &crossing, &triangle);
+                    let ControlFlow::Continue(limit) = limit else {
+                        return ControlFlow::Break(());
+                    };
+                    self.far = self.far.min(limit);
+                }
+                let Some(twin) = self.bvh.twins.get(next as usize) else { break };
+                (prim, triangle, next) = (twin.prim, twin.corners, twin.next);
             }
         }
         ControlFlow::Continue(self.far)
     }
 }
 
-impl<F: FnMut(u32, &Crossing, &Corners) -> ControlFlow<(), f32>> Hits<'_, F> {
-    #[inline(always)]
-    fn test(&mut self, prim: u32, triangle: &Corners) -> ControlFlow<()> {
-        if let Some(crossing) = self.probe.meet(prim, triangle) {
-            match (self.found)(prim, &crossing, triangle) {
-                ControlFlow::Continue(limit) => self.far = self.far.min(limit),
-                ControlFlow::Break(()) => return ControlFlow::Break(()),
-            }
-        }
-        ControlFlow::Continue(())
-    }
-}
-
 impl Probe {
     /// With ends that may have larger rounding errors than those of a ray made in this space, and are not where it was cut off.
-    fn with_ends(self, (start, end): (End, Option<End>)) -> Self {
+    #[inline(always)]
+    fn with_ends(self, (start, end): Ends) -> Self {
         Self { start, end, ..self }
     }
 
     /// The crossing with a triangle, if it is a hit of this query.
-    #[inline]
+    #[inline(always)]
     fn meet(&self, prim: u32, triangle: &Corners) -> Option<Crossing> {
         // The triangle that a ray starts on is among the candidates as a rule.
         if self.skip.contains(prim) {

@@ -47,7 +47,7 @@ impl Crossing {
 
 impl ShearedRay {
     /// Prepares a ray; its direction must be finite and not zero.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(ray: &Ray) -> Self {
         let d = ray.dir.to_array();
         let z = if d[0].abs() > d[1].abs() {
@@ -68,7 +68,7 @@ impl ShearedRay {
     }
 
     /// The crossing of the ray's line with a triangle. A triangle seen edge-on is not crossed.
-    #[inline]
+    #[inline(always)]
     pub(super) fn cross(&self, triangle: &Corners) -> Option<Crossing> {
         let [x, y, z] = self.axes;
         let [sx, sy, sz] = self.shear;

@@ -19,9 +19,8 @@ impl TriangleBvh {
     }
 
     fn winding(&self, p: Vec3) -> i32 {
-        let Some(probe) = self.probe(&Ray::new(p, DIRECTION), Skip::NOTHING) else { return 0 };
         let mut sum = 0;
-        self.visit(&probe, |_, crossing, _| {
+        self.visit(&Ray::new(p, DIRECTION), Skip::NOTHING, None, |_, _, crossing, _| {
             sum += if crossing.det < 0.0 { 1 } else { -1 };
             ControlFlow::Continue(f32::INFINITY)
         });
