@@ -6,17 +6,14 @@ use drt_estimators::surface::{
     Bsdf, Coating, Conductor, Dielectric, Mask, Plastic, ThinDielectric,
 };
 use drt_geom::Mesh;
-use drt_geom::procedural::{cube, grid, icosphere, rectangle};
+use drt_geom::procedural::{cube, icosphere, rectangle};
 use drt_math::{Rgb, Vec3, vec3};
-use drt_medium::{Homogeneous, Phase};
-use drt_motion::GeometryChange;
 
 use super::deforming::sky;
 use super::effects::{grow, raise, translate, turn};
 use super::set::{at, diffuse, placed};
 use super::{Cell, Set, Stage};
 use crate::Result;
-use crate::motion::moves;
 
 /// The half step of finite differences: what is seen past curved glass moves fast.
 const STEP: f64 = 0.02;
@@ -132,20 +129,6 @@ fn ball(radius: f64, place: Vec3) -> Mesh {
     at(&icosphere(3).with_smooth_normals(), Vec3::splat(radius), place)
 }
 
-/// A block behind a ball of glass.
-///
-/// # Errors
-/// When the library rejects the scene.
-pub fn glass_ball() -> Result<Stage> {
-    let pivot = vec3(0.0, 0.0, 1.0);
-    let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 6)?
-        .shape("block", block(0.5, vec3(0.1, 0.0, -0.8)), diffuse([0.8, 0.3, 0.2]))
-        .shape("ball", ball(0.9, pivot), glass());
-    let mut cells = moving("ball", pivot);
-    cells.push(Cell::new("ball flattens", [grow("ball", vec3(0.4, -0.3, 0.5), pivot)]).step(STEP));
-    Ok(stage("glass ball", set, cells))
-}
-
 /// A block that is seen beside a ball of silver and in it.
 ///
 /// # Errors
@@ -158,55 +141,4 @@ pub fn silver_ball() -> Result<Stage> {
     let mut cells = moving("ball", pivot);
     cells.push(Cell::new("ball flattens", [grow("ball", vec3(0.4, -0.3, 0.5), pivot)]).step(STEP));
     Ok(stage("silver ball", set, cells))
-}
-
-/// A block of milky glass, which bends.
-///
-/// # Errors
-/// When the library rejects the scene.
-pub fn milky_glass() -> Result<Stage> {
-    let milk = Homogeneous::new(Rgb::new(0.8, 1.0, 1.4), Rgb::splat(0.9), Rgb::ZERO)?;
-    let body = at(&icosphere(2).with_smooth_normals(), Vec3::splat(0.9), Vec3::ZERO);
-    let bends = |p: &Vec3| vec3(0.3 - p.x * p.z, 0.4 * p.x * p.y, 0.5 * p.x * p.x - 0.2 * p.y);
-    let bends = GeometryChange::VertexVelocity(body.positions.iter().map(bends).collect());
-    let set = under_a_sky(vec3(0.3, 0.8, 4.0), Vec3::ZERO, 6)?
-        .medium("milk", milk, Phase::Isotropic)
-        .filled("body", body, glass(), "milk", None)
-        .shape("block", block(0.35, vec3(0.2, 0.3, -1.6)), diffuse([0.8, 0.3, 0.2]));
-    let set = floor(diffuse([0.5, 0.5, 0.4]), set);
-    let cell = |name: &str, effect| Cell::new(name, [effect]).step(STEP);
-    let cells = vec![
-        cell("body bends", moves("body", bends)),
-        cell("body moves", translate("body", vec3(0.3, 0.2, 0.4))),
-        cell("block moves", translate("block", vec3(0.5, 0.3, 0.2))),
-    ];
-    Ok(stage("milky glass", set, cells))
-}
-
-/// Water with waves over a floor.
-///
-/// # Errors
-/// When the library rejects the scene.
-pub fn water() -> Result<Stage> {
-    let mut mesh = at(&grid(12, 12), vec3(2.0, 2.0, 1.0), Vec3::ZERO);
-    let height = |p: Vec3| 0.06 * (3.0 * p.x).sin() * (2.0 * p.y + 0.5).cos();
-    let lift = |scale: f64| move |p: &Vec3| *p + Vec3::Z * (scale * height(*p));
-    let rise: Vec<Vec3> = mesh.positions.iter().map(|p| Vec3::Z * height(*p)).collect();
-    mesh.positions = mesh.positions.iter().map(lift(1.0)).collect();
-    let mesh = mesh.with_smooth_normals();
-    let mesh = placed(&mesh, Vec3::splat(1.0), Vec3::X, -FRAC_PI_2, Vec3::ZERO);
-    let up = |v: Vec3| vec3(v.x, v.z, -v.y);
-    let waves = GeometryChange::VertexVelocity(rise.into_iter().map(up).collect());
-    let set = under_a_sky(vec3(0.2, 3.0, 2.6), Vec3::ZERO, 5)?.shape("water", mesh, glass()).shape(
-        "block",
-        block(0.35, vec3(0.2, -0.5, 0.1)),
-        diffuse([0.8, 0.3, 0.2]),
-    );
-    let set = floor(diffuse([0.5, 0.5, 0.4]), set);
-    let cell = |name: &str, effect| Cell::new(name, [effect]).step(STEP);
-    let cells = vec![
-        cell("waves rise", moves("water", waves)),
-        cell("block moves", translate("block", vec3(0.5, 0.1, 0.2))),
-    ];
-    Ok(stage("water", set, cells))
 }

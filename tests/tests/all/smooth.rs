@@ -28,4 +28,4 @@ macro_rules! stages {
     };
 }
 
-stages! { mirror varnish panes slab glass_ball silver_ball milky_glass water }
+stages! { mirror varnish panes slab silver_ball }
