@@ -160,9 +160,9 @@ pub(crate) struct RayByMover {
 struct Triangle<T> {
     corners: [Vec3<T>; 3],
     normals: Option<[Vec3<T>; 3]>,
-    /// By how much the index of refraction is higher than it is.
+    /// How much higher than it is the index of refraction is.
     more: T,
-    /// By how much the emitter behind it is elsewhere than it is.
+    /// How far the emitter that the chain ends at is from its place.
     shift: Vec3<T>,
 }
 
