@@ -138,7 +138,8 @@ pub fn silver_ball() -> Result<Stage> {
     let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 3)?
         .shape("block", block(0.5, vec3(1.3, 0.0, 1.8)), diffuse([0.8, 0.3, 0.2]))
         .shape("ball", ball(0.9, pivot), silver());
-    let mut cells = moving("ball", pivot);
+    // About its centre it would turn into itself.
+    let mut cells = moving("ball", vec3(0.3, -0.2, 0.6));
     cells.push(Cell::new("ball flattens", [grow("ball", vec3(0.4, -0.3, 0.5), pivot)]).step(STEP));
     Ok(stage("silver ball", set, cells))
 }
