@@ -71,15 +71,28 @@ pub(crate) fn named(kind: EstimatorKind) -> &'static dyn Estimator {
     }
 }
 
-/// The estimator that serves in place of the one that is asked for, where something `moves` in a scene: past smooth surfaces light
-/// follows from what comes before, so that only vertices which move with their rays, and rays which turn with what they meet
-/// there, have a derivative.
+/// Why, where something moves in a scene, [`Warped`] is the only estimator for it; `None` where it is not.
+///
+/// Past smooth surfaces light follows from what comes before, so that only vertices which move with their rays, and rays which turn with
+/// what they meet there, have a derivative. Where the camera does not see emitters, what it sees beside an edge is not what other edge
+/// samples find there.
+pub(crate) fn warped_alone(scene: &Scene) -> Option<&'static str> {
+    if scene.first_smooth().is_some() {
+        Some("of all estimators it alone has derivatives past smooth surfaces")
+    } else if scene.hides_something() {
+        Some("of all estimators it alone knows what `hide_emitters` hides")
+    } else {
+        None
+    }
+}
+
+/// The estimator that serves in place of the one that is asked for, where something `moves` in a scene.
 pub(crate) fn in_scene(
     asked: &'static dyn Estimator,
     scene: &Scene,
     moves: bool,
 ) -> &'static dyn Estimator {
-    if moves && scene.first_smooth().is_some() { &Warped } else { asked }
+    if moves && warped_alone(scene).is_some() { &Warped } else { asked }
 }
 
 /// Prepares a world for an estimator.

@@ -57,10 +57,6 @@ impl Scene {
         if moves {
             self.refuse_smooth_emitters(parameter)?;
         }
-        if self.hides_something() {
-            let reason = ElementError::HiddenEmitters { parameter: parameter.into() };
-            return Err(Error::Element { element: "integrator".into(), reason });
-        }
         Ok(())
     }
 
@@ -72,18 +68,22 @@ impl Scene {
         Err(unusable(&self.shapes[i].id, "shape", i, reason))
     }
 
-    /// Refuses derivatives by what moves of the light of points and directions that is seen past smooth surfaces, for an estimator that
-    /// does not know how its shadows move there.
-    pub(crate) fn refuse_delta_lights_past_smooth_surfaces(
-        &self,
-        parameter: &str,
-    ) -> Result<(), Error> {
-        let Some(smooth) = self.first_smooth() else { return Ok(()) };
+    /// Refuses derivatives by what moves of the light of points and directions that is seen past smooth surfaces, or by a camera that
+    /// does not see other emitters, for an estimator that does not know how its shadows move there.
+    pub(crate) fn refuse_delta_lights(&self, parameter: &str) -> Result<(), Error> {
         let lamp = self.emitters.iter().position(|e| e.item.emitter.is_delta());
         let Some(e) = lamp else { return Ok(()) };
-        let (parameter, surface) = (parameter.into(), self.name_of(Target::Shape(smooth)));
-        let reason = ElementError::DeltaLightPastSmooth { parameter, surface };
-        Err(unusable(&self.emitters[e].id, "emitter", e, reason))
+        let parameter = parameter.into();
+        if let Some(smooth) = self.first_smooth() {
+            let surface = self.name_of(Target::Shape(smooth));
+            let reason = ElementError::DeltaLightPastSmooth { parameter, surface };
+            return Err(unusable(&self.emitters[e].id, "emitter", e, reason));
+        }
+        if self.hides_something() {
+            let reason = ElementError::HiddenEmitters { parameter };
+            return Err(unusable(&self.emitters[e].id, "emitter", e, reason));
+        }
+        Ok(())
     }
 
     /// The first shape of a smooth surface.

@@ -26,7 +26,7 @@ use drt_medium::Coefficients;
 
 use crate::model::rendering::Counters;
 use crate::world::lights::LightSample;
-use crate::world::vertex::Vertex;
+use crate::world::vertex::{Kind, Vertex};
 use crate::world::{Crossing, RayPath, World};
 
 /// Longest path with unlimited depth: far beyond where Russian roulette lets any path go.
@@ -171,6 +171,11 @@ impl OutgoingRay {
         // Roulette must not end paths for the filter's sake: its derivative needs them.
         let alive = Alive::new(Rgb::ONE);
         Self { node: 0, vertex, dir, pdf: None, bent: false, throughput, alive, segments: 0 }
+    }
+
+    /// True of a camera's ray, where the camera does not see emitters.
+    pub(super) fn misses_emitters(&self, world: &World) -> bool {
+        world.hides_emitters && matches!(self.vertex.kind, Kind::Point)
     }
 
     /// What Russian roulette takes it to carry.

@@ -117,7 +117,7 @@ impl Tracer<'_> {
         let origin = leaving.vertex.x;
         let mut ray = self.ray.take().unwrap_or_default();
         let (world, counters) = (self.world, &mut self.counters);
-        if world.hides_emitters && M::EMISSION && leaving.segments == 0 {
+        if M::EMISSION && leaving.misses_emitters(world) {
             world.cast_past_emitters(&leaving.vertex, leaving.dir, &mut ray, counters);
         } else if leaving.bent {
             world.cast_bent(&leaving.vertex, leaving.dir, &mut ray, counters);
@@ -345,7 +345,7 @@ impl OutgoingRay {
                 (world.emitted(point, -self.dir), weight(light))
             })
         } else {
-            let hidden = world.hides_emitters && self.segments == 0;
+            let hidden = self.misses_emitters(world);
             let environment = world.lights.environment().filter(|_| !hidden)?;
             let radiance = environment.radiance(self.dir);
             Some((radiance, weight(environment.pdf(self.dir))))

@@ -163,7 +163,54 @@ fn what_is_not_derived_is_refused() {
     let mut hidden = surfaces(phong(), phong());
     hidden.integrator.hide_emitters = true;
     all(&refusal(&hidden, &both), &["sampling", "hidden emitters"]);
-    all(&refusal(&hidden, &Settings::default()), &["integrator", "hide_emitters", "`ball`"]);
+    for warp in [Warp::Points, Warp::Directions] {
+        let warp = warp(AuxiliarySamples::default());
+        let settings = Settings { estimator: Warped, warp, ..Settings::default() };
+        all(&refusal(&hidden, &settings), &["warp", "hide_emitters"]);
+    }
+}
+
+/// The camera sees through lamps and no sky, but both shine on what it sees.
+#[test]
+fn hidden_emitters_have_derivatives() {
+    let scenes = [surfaces(phong(), diffuse(0.6, 0.5, 0.7)), in_front_of_fog(fog_by_area_lights())];
+    let turn = GeometryChange::Rotate { axis: vec3(0.3, 0.8, -0.2), pivot: vec3(0.2, 0.0, 2.1) };
+    let parameters = [
+        parameter("ball", 0.0, vec![moves("ball", shift())]),
+        parameter("turn", 0.0, vec![moves("camera", turn)]),
+        parameter("lamp", 0.0, vec![moves("lamp", shift())]),
+        parameter("sky", 0.0, vec![changes("sky", "radiance", grey(0.3))]),
+    ];
+    for mut scene in scenes {
+        scene.integrator.max_depth = Some(3);
+        let settings = Settings { seed: 3, ..Settings::default() };
+        let derivatives = |scene: &Scene| rendered(scene, &parameters, &settings, 2000).derivatives;
+        let shown = derivatives(&scene);
+        scene.integrator.hide_emitters = true;
+        let own = derivatives(&scene);
+        let differences =
+            finite_differences(&scene, &parameters, &settings, 2000, 2e-2, &Unattended);
+        for ((a, b), shown) in own.iter().zip(&differences.expect("a valid scene")).zip(&shown) {
+            let found = agreement(&a.total, b, None);
+            assert!(found.agrees, "{} {found:?}", a.name);
+            // The lamp is small, and lights much more than it covers.
+            let fault =
+                if a.name == "lamp" { multiple(&a.total, -1.0) } else { shown.total.clone() };
+            let fault = agreement(&fault, b, None);
+            assert!(!fault.agrees, "{} {fault:?}", a.name);
+        }
+    }
+}
+
+/// Light of points in fog is left to another estimator, which does not know what is hidden.
+#[test]
+fn hidden_emitters_and_points_in_fog() {
+    let mut scene = fog();
+    scene.integrator.hide_emitters = true;
+    let parameters = [parameter("ball", 0.0, vec![moves("ball", shift())])];
+    let refused = Session::new(&scene, &parameters, &Settings::default()).err();
+    let message = refused.expect("a refusal").to_string();
+    assert!(message.contains("hide_emitters") && message.contains("`ball`"), "{message}");
 }
 
 #[test]

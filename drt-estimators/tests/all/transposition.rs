@@ -126,6 +126,14 @@ fn wobbles(scene: &Scene) -> Vec<Effect> {
 }
 
 #[test]
+fn hidden_emitters() {
+    let mut scene = surfaces(metal(), phong());
+    scene.integrator.hide_emitters = true;
+    let effects = wobbles(&scene);
+    by_one_estimator("hidden", &scene, effects, &settings(), SPP, 1e-9);
+}
+
+#[test]
 fn surfaces_everything_at_once() {
     let scene = surfaces(metal(), phong());
     let mut effects = wobbles(&scene);

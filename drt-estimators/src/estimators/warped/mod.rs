@@ -123,7 +123,7 @@ use crate::estimators::warped::auxiliary::points::AuxiliaryPoints;
 use crate::estimators::warped::edges::TurningEdges;
 use crate::estimators::warped::turning::EdgeTurns;
 use crate::estimators::{Changes, Estimator, mirrors};
-use crate::model::error::{Error, SettingError};
+use crate::model::error::{ElementError, Error, SettingError};
 use crate::model::scene::Scene;
 use crate::model::settings::{PathSampling, Settings, Warp};
 use crate::terms::boundary_source::BoundarySource;
@@ -188,6 +188,10 @@ impl Estimator for Warped {
                         && world.camera.sees_on_border(edge.edge.wedge.ends)
                 };
                 terms.edges = SeenEdges::in_view(world, found, Arc::clone(&spatial), on_border)?;
+                if world.hides_emitters && terms.edges.is_some() {
+                    let reason = ElementError::HiddenAtBorder;
+                    return Err(Error::Element { element: "integrator".into(), reason });
+                }
                 terms.sources.extend(terms.edges.as_ref().map(|_| BoundarySource::PrimaryEdges));
                 terms.flux = flux(world, active, &spatial);
                 terms
@@ -222,6 +226,7 @@ fn refuse(world: &World, warp: Warp, any: bool) -> Result<(), Error> {
         Warp::Edges => return Ok(()),
         _ if !surfaces_only => SettingError::SurfacesOnly,
         _ if any && world.scene.first_smooth().is_some() => SettingError::SmoothSurfaces,
+        _ if any && world.hides_emitters => SettingError::HiddenFromWarp,
         _ if any && world.camera.aperture().is_some() => SettingError::Aperture,
         _ if any && world.lights.has_image() => SettingError::VaryingSky,
         Warp::Directions(_) if world.camera.has_borders() => SettingError::JumpingFilter,

@@ -126,15 +126,21 @@ pub enum ElementError {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
-    /// Derivatives where the camera does not see emitters.
+    /// Light of points and directions in a scene with media, where something moves and the camera does not see other emitters.
     #[error(
-        "`hide_emitters` is true, and `{parameter}` can only be differentiated by finite differences where the \
-         camera sees through emitters"
+        "its light goes through media, `hide_emitters` hides others, and `{parameter}` moves something; only finite differences \
+         have this derivative"
     )]
     HiddenEmitters {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
+    /// An edge along a border of pixels, where the camera does not see emitters.
+    #[error(
+        "`hide_emitters` is true, and an edge of the scene lies exactly along a border of pixels; move the camera a little, or \
+         take a reconstruction filter that does not jump"
+    )]
+    HiddenAtBorder,
     /// Derivatives in material form by an orthographic camera whose film is in a medium.
     #[error(
         "its film is in a medium that scatters, and it or the medium's inside moves: `path-space` has no \

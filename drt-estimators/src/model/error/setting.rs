@@ -82,6 +82,9 @@ pub enum SettingError {
     /// A [`Warp`](crate::Warp) by auxiliary samples, past a smooth surface.
     #[error("auxiliary points and directions are not for scenes with smooth surfaces")]
     SmoothSurfaces,
+    /// A [`Warp`](crate::Warp) by auxiliary samples, where emitters are hidden from the camera.
+    #[error("auxiliary points and directions do not know what `hide_emitters` hides")]
+    HiddenFromWarp,
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,

@@ -171,7 +171,7 @@ impl Session {
             let slide = slides(estimator, scene, wanted.iter().copied());
             scene.refuse_derivatives(&scene.name_of(*target), moves, slide)?;
             if moves && !estimator.takes_delta_lights(scene, &self.asked) {
-                scene.refuse_delta_lights_past_smooth_surfaces(&scene.name_of(*target))?;
+                scene.refuse_delta_lights(&scene.name_of(*target))?;
             }
             let light = |t: &Target| !matches!(t, Target::Sensor(_)) && may_move(scene, *t);
             if let Some(target) = wanted.iter().find(|target| light(target)) {

@@ -79,7 +79,7 @@ impl<'a> Ground<'a> {
             let moving = tangents.targets().filter(|target| tangents.moves(*target));
             scene.refuse_derivatives(name, moves, slides(estimator, scene, moving))?;
             if moves && !estimator.takes_delta_lights(scene, settings) {
-                scene.refuse_delta_lights_past_smooth_surfaces(name)?;
+                scene.refuse_delta_lights(name)?;
             }
             if tangents.move_light() {
                 scene.refuse_rims(name)?;

@@ -181,22 +181,31 @@ fn lamp_at(place: Vec3) -> ShapeBuilder {
 
 /// A solid ball and a bulb in a box of fog with a denser blob in it, lit from outside as well.
 pub fn fog() -> Scene {
+    let scene = fog_by_area_lights();
+    let scene = scene.emitter("bulb", bulb(vec3(0.3, 0.7, 0.5)));
+    in_front_of_fog(scene.emitter("sun", sun(Rgb::new(0.7, 0.6, 0.5))))
+}
+
+/// The scene of [`fog`] as its camera sees it.
+pub fn in_front_of_fog(scene: SceneBuilder) -> Scene {
+    seen(scene, [vec3(0.4, 0.8, 4.2), vec3(0.0, 0.1, 0.0)], 4)
+}
+
+/// What is in [`fog`], lit by a lamp and a sky.
+pub fn fog_by_area_lights() -> SceneBuilder {
     let emission = Rgb::new(0.0, 0.1, 0.05);
     let thin = homogeneous(Rgb::new(0.4, 0.5, 0.3), Rgb::new(0.9, 0.6, 0.8), emission, 0.4);
     let dense = homogeneous(Rgb::new(1.5, 1.1, 2.0), Rgb::new(0.7, 0.9, 0.5), Rgb::ZERO, -0.3);
     let walls = placed(procedural::cube(), vec3(1.7, 1.5, 1.6), 0.15, vec3(0.0, 0.1, 0.0));
     let blob = placed(procedural::icosphere(0), Vec3::splat(0.5), 0.7, vec3(-0.7, 0.4, 0.3));
-    let scene = SceneBuilder::new()
+    SceneBuilder::new()
         .medium("thin", thin)
         .medium("dense", dense)
         .shape("box", ShapeBuilder::interface(walls).interior("thin"))
         .shape("blob", ShapeBuilder::interface(blob).interior("dense").exterior("thin"))
         .shape("ball", ShapeBuilder::new(ball(0.45, vec3(0.5, -0.3, 0.1)), phong()))
         .shape("lamp", lamp_at(vec3(0.2, 0.6, 0.3)))
-        .emitter("bulb", bulb(vec3(0.3, 0.7, 0.5)))
-        .emitter("sun", sun(Rgb::new(0.7, 0.6, 0.5)))
-        .emitter("sky", sky());
-    seen(scene, [vec3(0.4, 0.8, 4.2), vec3(0.0, 0.1, 0.0)], 4)
+        .emitter("sky", sky())
 }
 
 /// A block in a tub of fog with a floor at -1, both of one reflectance; its own bottom is at `bottom`.

@@ -10,7 +10,7 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use crate::estimators::named;
+use crate::estimators::{named, warped_alone};
 use crate::model::error::Error;
 use crate::model::settings::{EstimatorKind, PathSampling, Warp};
 use crate::run::session::choice::comparison::{
@@ -49,8 +49,7 @@ pub(crate) fn estimator(ground: &Ground<'_>, kept: &mut PreparedCache) -> Result
     if asked.estimator != EstimatorKind::Auto || ground.tangents.names.is_empty() {
         return named_one(asked.estimator, None, kept);
     }
-    if ground.moves() && ground.scene.first_smooth().is_some() {
-        let why = "of all estimators it alone has derivatives past smooth surfaces";
+    if let Some(why) = warped_alone(&ground.scene).filter(|_| ground.moves()) {
         return named_one(EstimatorKind::Warped, Some(why), kept);
     }
     if let Some(why) = needs_no_pilot(ground) {
