@@ -124,13 +124,14 @@ pub(crate) enum Mover {
     Lamp,
 }
 
-/// A ray of a chain by u: its origin x and its unit direction w, each with the derivatives by both coordinates.
+/// A ray of a chain by u: its origin x and its unit direction w, with the derivatives by both coordinates.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayByU {
     pub(crate) x: Vec3<ByU>,
     pub(crate) w: Vec3<ByU>,
-    pub(crate) dx: [Vec3<ByU>; 2],
-    pub(crate) dw: [Vec3<ByU>; 2],
+    /// The squared cosine [beyond](Bend::beyond) the surface that it left; 1 where no angle is critical.
+    pub(crate) beyond: ByU,
+    pub(crate) by_u: [RayVelocity; 2],
 }
 
 /// Derivatives of a ray that are continuous on bodies with interpolated normals.
@@ -146,6 +147,8 @@ pub(crate) struct Evened {
 pub(crate) struct RayVelocity {
     pub(crate) x: Vec3<ByU>,
     pub(crate) w: Vec3<ByU>,
+    /// How fast the squared cosine [beyond](Bend::beyond) the surface changes that the ray left.
+    pub(crate) beyond: ByU,
 }
 
 /// A ray by the velocity of something, along each axis.
@@ -203,20 +206,30 @@ impl Lamp {
 }
 
 impl Onward {
-    /// The unit direction in which a ray goes on from x, where it arrives along w and n is the unit normal.
-    fn direction<T: Real>(self, ray: &Ray<T>, n: Vec3<T>, more: T, shift: Vec3<T>) -> Vec3<T> {
+    /// The ray that goes on from x, where a ray arrives along the unit direction w and n is the unit normal.
+    fn ray<T: Real>(self, x: Vec3<T>, w: Vec3<T>, n: Vec3<T>, more: T, shift: Vec3<T>) -> Ray<T> {
         match self {
-            Self::Bent(bend) => bend.onward(ray.w, n, more),
-            Self::To(lamp) => lamp.seen_from(ray.x, shift),
+            Self::Bent(bend) => {
+                let beyond = bend.beyond(w, n, more).unwrap_or(T::one());
+                Ray { x, w: bend.onward(w, n, more), beyond }
+            }
+            Self::To(lamp) => Ray { x, w: lamp.seen_from(x, shift), beyond: T::one() },
         }
     }
 }
 
-/// A ray over any scalar.
+/// A ray over any scalar, as [`RayByU`] is one.
 #[derive(Clone, Copy)]
 struct Ray<T> {
     x: Vec3<T>,
     w: Vec3<T>,
+    beyond: T,
+}
+
+impl<T: Real> Ray<T> {
+    fn starting(x: Vec3<T>, w: Vec3<T>) -> Self {
+        Self { x, w, beyond: T::one() }
+    }
 }
 
 impl Link {
@@ -285,9 +298,8 @@ impl Link {
                 na * (T::one() - s - t) + nb * s + nc * t
             }
         };
-        let arrives = Ray { x, w: ray.w };
         let Triangle { more, shift, .. } = *triangle;
-        Ray { x, w: self.onward.direction(&arrives, n.normalize(), more, shift) }
+        self.onward.ray(x, ray.w, n.normalize(), more, shift)
     }
 }
 
@@ -362,6 +374,20 @@ impl Link {
     }
 }
 
+impl RayVelocity {
+    /// Nothing moves.
+    const STILL: Self = {
+        let still = Vec3 { x: ZERO, y: ZERO, z: ZERO };
+        Self { x: still, w: still, beyond: ZERO }
+    };
+
+    /// The derivatives that a lane of dual numbers has.
+    fn lane<const N: usize>(ray: &Ray<Dual<ByU, N>>, k: usize) -> Self {
+        let by = |v: Vec3<Dual<ByU, N>>| v.to_array().map(|c| c.eps[k]).into();
+        Self { x: by(ray.x), w: by(ray.w), beyond: ray.beyond.eps[k] }
+    }
+}
+
 impl LinkHit {
     /// How far along the ray the surface is met later, where it is farther by v. Facets are seen at angles at which the surface that
     /// they stand for is not: there the shading normal is across the ray, and so nothing is divided by its cosine.
@@ -392,10 +418,9 @@ impl LinkHit {
             from_fn::<_, 3, _>(|k| Dual::new(v[k], [rate[k]])).into()
         };
         let more = Dual::new(ZERO, [ByU::from(index)]);
-        let arrives = Ray { x: variable(self.y, x), w: variable(self.w, w) };
+        let (y, w) = (variable(self.y, x), variable(self.w, w));
         let (n, shift) = (variable(self.n, n.reject(self.n)), variable(Vec3::zero(), lamp));
-        let onward = onward.direction(&arrives, n, more, shift);
-        RayVelocity { x, w: onward.to_array().map(|c| c.eps[0]).into() }
+        RayVelocity::lane(&onward.ray(y, w, n, more, shift), 0)
     }
 }
 
@@ -414,11 +439,11 @@ pub(crate) fn evened(
     let d = direction(frame, u).to_array();
     let mut before = [start.lift(), d.map(|c| c.re).into()];
     let mut now = Evened {
-        by_u: from_fn(|k| RayVelocity { x: Vec3::zero(), w: d.map(|c| c.eps[k]).into() }),
+        by_u: from_fn(|k| RayVelocity { w: d.map(|c| c.eps[k]).into(), ..RayVelocity::STILL }),
         by_movers: Vec::new(),
     };
     if viewer_moves {
-        let axes = AXES.map(|axis| RayVelocity { x: axis.lift(), w: Vec3::zero() });
+        let axes = AXES.map(|axis| RayVelocity { x: axis.lift(), ..RayVelocity::STILL });
         now.by_movers.push(RayByMover { mover: Mover::Viewer, axes });
     }
     let mut pass = |((link, ray), slopes): ((&Link, &RayByU), &Option<[Mat3; 3]>)| {
@@ -433,7 +458,7 @@ pub(crate) fn evened(
             now.by_movers.extend(link.movers(&meeting));
         }
         if bends {
-            let still = RayVelocity { x: Vec3::zero(), w: Vec3::zero() };
+            let still = RayVelocity::STILL;
             let rates = OnwardRates { index: 1.0, ..OnwardRates::STILL };
             let axes = [meeting.turned(link.onward, rates), still, still];
             now.by_movers.push(RayByMover { mover: Mover::Index(link.bsdf), axes });
@@ -491,16 +516,15 @@ pub(crate) fn first_ray(start: Vec3, frame: &Frame) -> [Vec3<ByU>; 2] {
 /// The ray behind each of a chain's surfaces. `frame` is about the first ray's direction.
 pub(crate) fn rays_by_u(start: Vec3, frame: &Frame, links: &[Link]) -> Vec<RayByU> {
     let u = from_fn(|k| Dual::<ByU, 2>::variable(Dual::variable(0.0, k), k));
-    let mut ray = Ray { x: start.lift(), w: direction(frame, u) };
+    let mut ray = Ray::starting(start.lift(), direction(frame, u));
     let mut pass = |link: &Link| {
         ray = link.pass(ray, &link.triangle());
-        let by = |v: Vec3<Dual<ByU, 2>>, k: usize| v.to_array().map(|c| c.eps[k]).into();
         let value = |v: Vec3<Dual<ByU, 2>>| v.to_array().map(|c| c.re).into();
         RayByU {
             x: value(ray.x),
             w: value(ray.w),
-            dx: from_fn(|k| by(ray.x, k)),
-            dw: from_fn(|k| by(ray.w, k)),
+            beyond: ray.beyond.re,
+            by_u: from_fn(|k| RayVelocity::lane(&ray, k)),
         }
     };
     links.iter().map(&mut pass).collect()
@@ -516,7 +540,7 @@ pub(crate) fn ray_by_movers(
 ) -> Vec<RayByMover> {
     let u = from_fn(|k| ByU::variable(0.0, k));
     let d = direction(frame, u).to_array().map(constant).into();
-    let first = Ray { x: start.lift(), w: d };
+    let first = Ray::starting(start.lift(), d);
     let mut found = Vec::new();
     let through = |ray: Ray<ByMatter>, from: usize| {
         links[from..].iter().fold(ray, |ray, link| link.pass(ray, &link.triangle()))
@@ -568,10 +592,7 @@ fn variable(v: Vec3, k: usize) -> Vec3<ByMatter> {
 }
 
 fn axes(ray: &Ray<ByMatter>, k: usize) -> [RayVelocity; 3] {
-    from_fn(|axis| {
-        let by = |v: Vec3<ByMatter>| v.to_array().map(|c| c.eps[3 * k + axis]).into();
-        RayVelocity { x: by(ray.x), w: by(ray.w) }
-    })
+    from_fn(|axis| RayVelocity::lane(ray, 3 * k + axis))
 }
 
 #[cfg(test)]

@@ -74,6 +74,7 @@ use crate::derivative::velocity::{
     ByU, ChainPart, ChainedRay, Link, LinkChange, Mover, RayBehind, RayByMover, RayByU,
     RayVelocity, TangentPlane, Weight, evened, first_ray, ray_by_movers, rays_by_u,
 };
+use crate::estimators::warped::critical::CriticalAngle;
 use crate::estimators::warped::edge::TurningEdge;
 use crate::estimators::warped::edges::TurningEdges;
 use crate::estimators::warped::near::{BEHIND, NARROW};
@@ -179,11 +180,11 @@ impl TurnedBehind {
         smooth: &[RayByMover],
         movers: impl FnOnce() -> Vec<RayByMover>,
     ) {
-        let Some(cone) = line.cone() else { return };
         // By both kinds of derivatives: sums of w A and of w t A.
         let mut sums = [[[[ByU::from(0.0); 2]; 2]; 2]; 2];
-        let mut any = false;
-        let all = edges.visit_all::<Infallible>(&cone, |edge| {
+        let critical = CriticalAngle::beside(line.ray, line.evened, line.square);
+        let mut any = critical.is_some();
+        let mut add = |edge: &TurningEdge| {
             if let Some(beside) = line.beside(edge) {
                 any = true;
                 self.sum += beside.weight;
@@ -198,20 +199,28 @@ impl TurnedBehind {
                     self.turn_with(edge, line, &beside);
                 }
             }
-            ControlFlow::Continue(())
-        });
-        debug_assert!(all.is_continue());
+            ControlFlow::<Infallible>::Continue(())
+        };
+        if let Some(cone) = line.cone() {
+            let all = edges.visit_all(&cone, &mut add);
+            debug_assert!(all.is_continue());
+        }
         if !any {
             return;
         }
+        let mut by_beyond = [[ByU::from(0.0); 2]; 2];
+        if let Some(CriticalAngle { inverses, weight }) = critical {
+            self.sum += weight;
+            by_beyond = inverses.map(|inverse| inverse.map(|v| v * weight));
+        }
         let movers = movers();
         self.moves |= !movers.is_empty();
-        for (sums, movers) in sums.iter().zip([smooth, &movers]) {
+        for ((sums, by_beyond), movers) in sums.iter().zip(by_beyond).zip([smooth, &movers]) {
             self.parts.extend(movers.iter().map(|RayByMover { mover, axes }| {
                 let rate = axes.each_ref().map(|rate| {
                     let at = [rate.x, rate.w].map(|v| line.coordinates(v));
                     let v = [0, 1].map(|i| apply(&sums[i], at[i]));
-                    from_fn(|k| -(v[0][k] + v[1][k]))
+                    from_fn(|k| -(v[0][k] + v[1][k] + by_beyond[k] * rate.beyond))
                 });
                 (*mover, rate)
             }));
@@ -313,8 +322,7 @@ impl<'a> Line<'a> {
 
     /// The continuous derivatives by u.
     fn by_u(&self) -> [RayVelocity; 2] {
-        let own = || from_fn(|k| RayVelocity { x: self.ray.dx[k], w: self.ray.dw[k] });
-        self.evened.map_or_else(own, |(rates, _)| rates)
+        self.evened.map_or(self.ray.by_u, |(rates, _)| rates)
     }
 
     /// The coordinates of a vector across the ray.
@@ -428,8 +436,7 @@ impl<'a> Line<'a> {
         let inverses = match self.evened {
             None => [[[ByU::from(0.0); 2]; 2], inverse],
             Some((_, inside)) => {
-                let own = from_fn(|k| RayVelocity { x: ray.dx[k], w: ray.dw[k] });
-                let own = self.inverse(own, distance, m)?;
+                let own = self.inverse(ray.by_u, distance, m)?;
                 let both = near + length_squared(apply(&own, offset));
                 let exact = inside.squared() / (inside.squared() + both / self.square);
                 let scaled = |m: Matrix, by: ByU| m.map(|row| row.map(|c| c * by));

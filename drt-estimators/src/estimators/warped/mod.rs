@@ -101,6 +101,7 @@
 mod auxiliary;
 mod behind;
 mod beside;
+mod critical;
 mod edge;
 mod edges;
 mod near;

@@ -138,7 +138,7 @@ pub enum ElementError {
     /// An edge along a border of pixels, where the camera does not see emitters.
     #[error(
         "`hide_emitters` is true, and an edge of the scene lies exactly along a border of pixels; move the camera a little, or \
-         take a reconstruction filter that does not jump"
+         take a continuous reconstruction filter"
     )]
     HiddenAtBorder,
     /// Derivatives in material form by an orthographic camera whose film is in a medium.

@@ -138,18 +138,19 @@ impl Model for Dielectric {
         let (n, eta) = if cosine > 0.0 { (n, own) } else { (-n, own.recip()) };
         let reflected = dielectric_reflected(Dual::variable(cosine.abs(), COSINE), eta);
         let reflecting = chance_of_reflection(reflected.re, eta.re);
+        let by_property = if cosine > 0.0 { 1.0 } else { -eta.re * eta.re };
         let found = |value: Rgb<Dual<f64, 4>>, probability, bend| {
             let by_cosine = value.map(|c| c.eps[COSINE] * cosine.signum());
             SpecularValue::by_duals(self.differentiated(), value, by_cosine, probability, bend)
         };
         if same(mirrored(wo, n), wi) {
             let colour = numbers.colour(Property::SpecularReflectance, self.specular_reflectance);
-            return Some(found(colour * reflected, reflecting, Bend::Mirror));
+            let bend = Bend::reflection(eta.re, by_property);
+            return Some(found(colour * reflected, reflecting, bend));
         }
         refracted(wo, n, eta.re).filter(|(w, _)| same(*w, wi))?;
         let colour = numbers.colour(Property::SpecularTransmittance, self.specular_transmittance);
         let value = colour * ((Dual::from(1.0) - reflected) / eta.squared());
-        let by_property = if cosine > 0.0 { 1.0 } else { -eta.re * eta.re };
         Some(found(value, 1.0 - reflecting, Bend::refraction(eta.re, by_property)))
     }
 }

@@ -82,6 +82,8 @@ pub(crate) enum Bend {
     Straight,
     /// Reflected.
     Mirror,
+    /// Reflected inside of the denser of two media; the index is that beyond the surface over that on this side.
+    Inside(RelativeIndex),
     /// Refracted.
     Refraction(RelativeIndex),
 }
@@ -94,7 +96,19 @@ pub(crate) struct RelativeIndex {
     pub(crate) by_property: f64,
 }
 
+impl RelativeIndex {
+    /// It, where the index that the surface has as a property is higher by `more`.
+    fn raised<T: Real>(self, more: T) -> T {
+        more * self.by_property + T::from(self.value)
+    }
+}
+
 impl Bend {
+    /// Reflected by an interface of two media, with the index beyond it over that on this side, as in [`refraction`](Self::refraction).
+    pub(crate) fn reflection(value: f64, by_property: f64) -> Self {
+        if value < 1.0 { Self::Inside(RelativeIndex { value, by_property }) } else { Self::Mirror }
+    }
+
     /// Refracted, by the index on the side of the light's direction over that on the other, and the derivative of this by the index that the
     /// surface has as a property.
     pub(crate) fn refraction(value: f64, by_property: f64) -> Self {
@@ -107,14 +121,26 @@ impl Bend {
         let cos = n.dot(w);
         match self {
             Self::Straight => w,
-            Self::Mirror => w - n * (cos * 2.0),
-            Self::Refraction(RelativeIndex { value, by_property }) => {
-                let eta = more * by_property + T::from(value);
+            Self::Mirror | Self::Inside(_) => w - n * (cos * 2.0),
+            Self::Refraction(index) => {
+                let eta = index.raised(more);
                 let beyond = T::one() - (T::one() - cos.squared()) / eta.squared();
                 let beyond = if beyond.re() > 0.0 { beyond.sqrt() } else { T::zero() };
                 let beyond = if cos.re() < 0.0 { -beyond } else { beyond };
                 w / eta + n * (beyond - cos / eta)
             }
+        }
+    }
+
+    /// The squared cosine of the angle of refraction into a thinner medium, which is zero at the critical angle and negative where
+    /// light is totally reflected. `None` where no angle is critical.
+    pub(crate) fn beyond<T: Real>(self, w: Vec3<T>, n: Vec3<T>, more: T) -> Option<T> {
+        match self {
+            Self::Inside(index) | Self::Refraction(index) if index.value < 1.0 => {
+                let sine = T::one() - n.dot(w).squared();
+                Some(T::one() - sine / index.raised(more).squared())
+            }
+            _ => None,
         }
     }
 

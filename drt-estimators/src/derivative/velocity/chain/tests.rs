@@ -11,7 +11,7 @@ fn next(rng: &mut Rng) -> Vec3 {
 /// A mirror, an interface and a surface that light goes straight through, each about across the z axis, at places that a ray along
 /// it meets one after the other. In place of the mirror a surface may be connected to a lamp, which may be at infinity.
 fn chain(rng: &mut Rng, interpolated: bool, lamp: Option<bool>) -> Vec<Link> {
-    let bends = [Bend::refraction(1.5, 1.0), Bend::Straight, Bend::Mirror];
+    let bends = [Bend::refraction(1.5, 1.0), Bend::Straight, Bend::reflection(0.8, 1.0)];
     let link = |(i, bend): (u32, Bend)| {
         let place = Vec3::Z * f64::from(i + 1);
         let corners = [vec3(-2.0, -2.0, 0.0), vec3(3.0, -1.0, 0.2), vec3(-1.0, 3.0, -0.2)];
@@ -32,17 +32,30 @@ fn chain(rng: &mut Rng, interpolated: bool, lamp: Option<bool>) -> Vec<Link> {
     links
 }
 
-fn traced(start: Vec3, frame: &Frame, u: [f64; 2], links: &[Link]) -> [Vec3; 2] {
-    let ray = Ray { x: start, w: direction(frame, u) };
+/// A ray's origin and direction, and the squared cosine beyond the last surface.
+type Traced = [Vec3; 3];
+
+fn traced(start: Vec3, frame: &Frame, u: [f64; 2], links: &[Link]) -> Traced {
+    let ray = Ray::starting(start, direction(frame, u));
     let ray = links.iter().fold(ray, |ray, link| link.pass(ray, &link.triangle()));
-    [ray.x, ray.w]
+    [ray.x, ray.w, Vec3::X * ray.beyond]
 }
 
-fn apart(a: [Vec3; 2], b: [Vec3; 2], h: f64) -> [Vec3; 2] {
-    [(a[0] - b[0]) / h, (a[1] - b[1]) / h]
+fn rate(of: &RayVelocity) -> Traced {
+    [of.x.re(), of.w.re(), Vec3::X * of.beyond.re]
 }
 
-fn assert_same(found: [Vec3; 2], expected: [Vec3; 2], what: &str) {
+/// How fast a rate changes along a coordinate of u.
+fn rate_along(of: &RayVelocity, k: usize) -> Traced {
+    let along = |v: Vec3<ByU>| -> Vec3 { v.to_array().map(|c| c.eps[k]).into() };
+    [along(of.x), along(of.w), Vec3::X * of.beyond.eps[k]]
+}
+
+fn apart(a: Traced, b: Traced, h: f64) -> Traced {
+    from_fn(|i| (a[i] - b[i]) / h)
+}
+
+fn assert_same(found: Traced, expected: Traced, what: &str) {
     for (f, e) in found.into_iter().zip(expected) {
         assert!((f - e).max_abs() < 1e-5 * (1.0 + e.max_abs()), "{what}: {f:?} {e:?}");
     }
@@ -73,12 +86,12 @@ fn derivatives_are_differences() {
                 traced(start, &frame, u, &links)
             };
             let expected = apart(at(H), at(-H), 2.0 * H);
-            assert_same([ray.dx[k].re(), ray.dw[k].re()], expected, "by u");
-            let along = |v: Vec3<ByU>| -> Vec3 { v.to_array().map(|c| c.eps[k]).into() };
-            assert_same([along(ray.x), along(ray.w)], expected, "by u");
+            assert_same(rate(&ray.by_u[k]), expected, "by u");
+            let value = RayVelocity { x: ray.x, w: ray.w, beyond: ray.beyond };
+            assert_same(rate_along(&value, k), expected, "by u");
             let [plus, zero, minus] = [at(H), at(0.0), at(-H)];
-            let second = [0, 1].map(|i| (plus[i] + minus[i] - zero[i] * 2.0) / (H * H));
-            assert_same([along(ray.dx[k]), along(ray.dw[k])], second, "by u twice");
+            let second = from_fn(|i| (plus[i] + minus[i] - zero[i] * 2.0) / (H * H));
+            assert_same(rate_along(&ray.by_u[k], k), second, "by u twice");
         }
         // Evened derivatives are the same where nothing is interpolated.
         if round % 2 == 1 {
@@ -89,9 +102,8 @@ fn derivatives_are_differences() {
             assert_eq!(even.by_movers.len(), exact.len());
             for (a, b) in even.by_movers.iter().zip(&exact) {
                 for (a, b) in a.axes.iter().zip(&b.axes) {
-                    assert_same([a.x.re(), a.w.re()], [b.x.re(), b.w.re()], "evened");
-                    let turn = |v: Vec3<ByU>| v.to_array().map(|c| c.eps[0]).into();
-                    assert_same([turn(a.x), turn(a.w)], [turn(b.x), turn(b.w)], "evened");
+                    assert_same(rate(a), rate(b), "evened");
+                    assert_same(rate_along(a, 0), rate_along(b, 0), "evened");
                 }
             }
         }
@@ -111,7 +123,7 @@ fn rates_are_differences() {
             bends: true,
         });
         for RayByMover { mover, axes } in found {
-            for (rate, axis) in axes.iter().zip(AXES) {
+            for (found, axis) in axes.iter().zip(AXES) {
                 let at = |h: f64| {
                     let (mut links, mut start) = (links.clone(), start);
                     let corner =
@@ -122,10 +134,10 @@ fn rates_are_differences() {
                             links[point.shape as usize].corners[corner(point.at.bary)] += axis * h;
                         }
                         Mover::Index(shape) => {
-                            if let Onward::Bent(bend @ Bend::Refraction(_)) =
+                            if let Onward::Bent(Bend::Refraction(index) | Bend::Inside(index)) =
                                 &mut links[shape].onward
                             {
-                                *bend = Bend::refraction(1.5 + h * axis.x, 1.0);
+                                index.value += h * axis.x;
                             }
                         }
                         Mover::Lamp => {
@@ -141,7 +153,7 @@ fn rates_are_differences() {
                     traced(start, &frame, [0.0; 2], &links)
                 };
                 let expected = apart(at(H), at(-H), 2.0 * H);
-                assert_same([rate.x.re(), rate.w.re()], expected, "by what moves");
+                assert_same(rate(found), expected, "by what moves");
             }
         }
     }
