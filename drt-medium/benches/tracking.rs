@@ -201,7 +201,7 @@ fn take_turns(
 fn distances(media: &[Named]) {
     println!("{:24} {:>8} {:>8} {:>8}", "distance", "ns", "cells", "lookups");
     let costs = take_turns(media, |_, medium, ray, rng, stats| {
-        let sample = medium.sample_distance(&ray, Rgb::ONE, 0.0, rng, stats);
+        let sample = medium.sample_distance(ray, Rgb::ONE, 0.0, rng, stats);
         black_box(sample);
     });
     for ((name, _), cost) in media.iter().zip(&costs) {
@@ -218,7 +218,7 @@ fn transmittances(media: &[Named]) {
     );
     let mut estimates = vec![[Moments::ZERO; CALLS]; media.len()];
     let costs = take_turns(media, |[m, r], medium, ray, rng, stats| {
-        let t = medium.transmittance(&ray, rng, stats);
+        let t = medium.transmittance(ray, rng, stats);
         estimates[m][r].push(t.g);
     });
     let rows: Vec<_> = (media.iter().zip(costs).zip(estimates))
