@@ -80,12 +80,12 @@ fn files_are_found_by_their_extension() {
         std::fs::write(path(name), text).unwrap();
     }
     for name in ["a.node", "a.ele", "b.mesh"] {
-        assert_eq!(read_tet_mesh(&path(name)).unwrap(), two_tets());
+        assert_eq!(read_tet_mesh(path(name)).unwrap(), two_tets());
     }
     std::fs::remove_file(path("a.node")).unwrap();
-    let error = read_tet_mesh(&path("a.ele")).unwrap_err();
+    let error = read_tet_mesh(path("a.ele")).unwrap_err();
     assert!(error.file.ends_with("a.node") && matches!(error.kind, Kind::Unreadable(_)), "{error}");
-    let error = read_tet_mesh(&path("b.msh")).unwrap_err();
+    let error = read_tet_mesh(path("b.msh")).unwrap_err();
     assert_eq!(error.kind, Kind::UnknownFormat);
     std::fs::remove_dir_all(&folder).unwrap();
 }
