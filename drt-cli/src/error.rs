@@ -39,6 +39,7 @@ impl fmt::Display for Place {
 
 /// Something in an input that is passed over: harmless, but perhaps not meant.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Warning {
     /// Where.
     pub place: Place,

@@ -19,7 +19,8 @@ pub use error::CliError;
 pub use files::atomic::{check_target, write_atomically};
 pub use files::digest::{RunFacts, Verdict, digest, write_digest};
 pub use files::image::{
-    ExrFile, Picture, Provenance, Tone, ToneCurve, read_exr, read_picture, write_exr, write_preview,
+    ExrFile, Picture, Provenance, Tone, ToneCurve, decode_exr, read_exr, read_picture, write_exr,
+    write_preview,
 };
 pub use files::measured_file::encode_measured;
 pub use files::npy::write_npy;

@@ -14,7 +14,7 @@ use drt_estimators::surface::{Bsdf, Diffuse};
 use drt_estimators::{Control, FinishedTile, Scene, SceneBuilder, Session, Settings, ShapeBuilder};
 use drt_math::{Affine, Mat3, Rgb, vec3};
 use drt_medium::{Homogeneous, Medium, Phase};
-use drt_motion::{Change, Effect, GeometryChange, Parameter};
+use drt_motion::{GeometryChange, Parameter};
 
 /// Counts tiles and stops when told to.
 #[derive(Default)]
@@ -36,14 +36,8 @@ impl Control for Watch {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = fog_with_ball()?;
-    let slide = Parameter {
-        name: "slide".into(),
-        value: 0.0,
-        effects: vec![Effect {
-            target: "ball".into(),
-            change: Change::Geometry(GeometryChange::Translate(vec3(1.0, 0.0, 0.0))),
-        }],
-    };
+    let right = GeometryChange::Translate(vec3(1.0, 0.0, 0.0));
+    let slide = Parameter::new("slide").effect("ball", right);
     let mut session = Session::new(&scene, &[slide], &Settings::default())?;
     print!("{}", session.plan());
 

@@ -93,7 +93,7 @@ fn mesh(path: Option<&str>) -> Result<Mesh, Box<dyn Error>> {
     match path {
         None => Ok(procedural::bumpy_sphere(6, 0.2, 6.0)),
         #[cfg(feature = "obj")]
-        Some(path) => Ok(drt_geom::load_obj(&std::fs::read(path)?, path)?),
+        Some(path) => Ok(drt_geom::read_obj(path)?),
         #[cfg(not(feature = "obj"))]
         Some(path) => Err(format!("{path}: build with --features obj").into()),
     }

@@ -9,7 +9,7 @@ use std::error::Error;
 use std::time::{Duration, Instant};
 
 use drt_geom::{
-    Mesh, TetMesh, Tetrahedralization, TetrahedralizeInput, load_obj, procedural, tetrahedralize,
+    Mesh, TetMesh, Tetrahedralization, TetrahedralizeInput, procedural, read_obj, tetrahedralize,
     tetrahedralize_tetgen,
 };
 
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut meshes = Vec::new();
     // Cargo adds --bench.
     for path in std::env::args().skip(1).filter(|w| w != "--bench") {
-        let mesh = load_obj(&std::fs::read(&path)?, &path)?;
+        let mesh = read_obj(&path)?;
         let name = path.rsplit('/').next().unwrap_or(&path).to_owned();
         meshes.push((name, mesh.drop_degenerate().0));
     }

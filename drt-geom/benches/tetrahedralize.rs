@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 #[cfg(feature = "obj")]
 fn load(path: &str) -> Result<Mesh, Box<dyn Error>> {
-    Ok(drt_geom::load_obj(&std::fs::read(path)?, path)?)
+    Ok(drt_geom::read_obj(path)?)
 }
 
 #[cfg(not(feature = "obj"))]

@@ -62,15 +62,13 @@ fn sky_visibility(mesh: &Mesh, bvh: &TriangleBvh, samples: u32) -> (f64, f64) {
 }
 
 fn load(path: &str) -> Result<Mesh, Box<dyn std::error::Error>> {
-    let bytes = std::fs::read(path)?;
     #[cfg(feature = "obj")]
     if path.ends_with(".obj") {
-        return Ok(drt_geom::load_obj(&bytes, path)?);
+        return Ok(drt_geom::read_obj(path)?);
     }
     #[cfg(feature = "ply")]
     if path.ends_with(".ply") {
-        return Ok(drt_geom::load_ply(&bytes, path)?);
+        return Ok(drt_geom::read_ply(path)?);
     }
-    Err(format!("{path} ({} bytes): build with the feature obj or ply to read it", bytes.len())
-        .into())
+    Err(format!("{path}: build with the feature obj or ply to read it").into())
 }

@@ -26,19 +26,23 @@ mod weld;
 // What the public interface is made of, so that one dependency is enough.
 pub use drt_math;
 
+pub use drt_math::Ray;
+
 pub use aabb::Aabb;
 pub use crossing::{CrossingSegment, crossing_pairs, crossing_segments};
 pub use intersect::ray_plane;
 #[cfg(feature = "obj")]
-pub use io::{ObjError, ObjErrorKind, load_obj, load_obj_mended};
+pub use io::{ObjError, ObjErrorKind, decode_obj, decode_obj_mended, read_obj};
 #[cfg(feature = "ply")]
-pub use io::{PlyError, PlyErrorKind, load_ply, load_ply_mended, read_vertex_vectors};
+pub use io::{
+    PlyError, PlyErrorKind, decode_ply, decode_ply_mended, decode_vertex_vectors, read_ply,
+};
 #[cfg(feature = "tet")]
-pub use io::{TetFileError, TetFileErrorKind, load_tet_mesh, read_medit, read_tetgen};
+pub use io::{TetFileError, TetFileErrorKind, decode_medit, decode_tetgen, read_tet_mesh};
 pub use mesh::{Mesh, MeshAttribute, MeshError};
 pub use query::{
-    BvhBuilder, BvhError, ClosestPoint, Hit, InstancePlacement, InstancedBvh, Ray, Skip,
-    TriangleBvh, coincide, nearest_point,
+    BvhBuilder, BvhError, ClosestPoint, Hit, InstancePlacement, InstancedBvh, Skip, TriangleBvh,
+    coincide, nearest_point,
 };
 pub use tet::{
     ConformityError, SurfacePlace, TetLocator, TetMesh, TetMeshError, TetPoint, TetVertexOrigin,

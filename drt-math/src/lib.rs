@@ -15,6 +15,7 @@ mod dual;
 pub mod fm;
 mod frame;
 mod mat3;
+mod ray;
 mod real;
 mod rgb;
 mod rng;
@@ -33,6 +34,7 @@ pub use frame::Frame;
 /// The version whose types convert to and from those here.
 pub use glam;
 pub use mat3::Mat3;
+pub use ray::Ray;
 pub use real::Real;
 pub use rgb::{Rgb, RgbVec};
 pub use rng::Rng;

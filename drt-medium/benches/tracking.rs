@@ -155,7 +155,7 @@ fn rays() -> Vec<Ray> {
     let ray = |_| {
         let ([a, b], [c, d]) = (rng.next_2d(), rng.next_2d());
         let (from, to) = (vec3(a, b, 0.0), vec3(c, d, 1.0));
-        Ray::new(from, (to - from).normalize(), (to - from).length())
+        Ray::new(from, (to - from).normalize()).until((to - from).length())
     };
     (0..CALLS).map(ray).collect()
 }
@@ -201,8 +201,7 @@ fn take_turns(
 fn distances(media: &[Named]) {
     println!("{:24} {:>8} {:>8} {:>8}", "distance", "ns", "cells", "lookups");
     let costs = take_turns(media, |_, medium, ray, rng, stats| {
-        let sample =
-            medium.sample_distance(ray.origin, ray.dir, ray.t_max, Rgb::ONE, 0.0, rng, stats);
+        let sample = medium.sample_distance(ray, Rgb::ONE, 0.0, rng, stats);
         black_box(sample);
     });
     for ((name, _), cost) in media.iter().zip(&costs) {
@@ -219,7 +218,7 @@ fn transmittances(media: &[Named]) {
     );
     let mut estimates = vec![[Moments::ZERO; CALLS]; media.len()];
     let costs = take_turns(media, |[m, r], medium, ray, rng, stats| {
-        let t = medium.transmittance(ray.origin, ray.dir, ray.t_max, rng, stats);
+        let t = medium.transmittance(ray, rng, stats);
         estimates[m][r].push(t.g);
     });
     let rows: Vec<_> = (media.iter().zip(costs).zip(estimates))

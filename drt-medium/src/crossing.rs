@@ -7,6 +7,7 @@ use crate::{GridMedium, Ray};
 
 /// A place where a ray passes through a face of a grid's box, and the extinction jumps to zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Crossing {
     /// Distance along the ray.
     pub t: f64,

@@ -96,7 +96,7 @@ impl DeformedGrid {
 
 /// A stretch of a ray in the space of the grids, with distances from its start.
 fn seen_from(ray: &Ray, start: f64, end: f64, map: &Affine) -> Ray {
-    Ray::new(map.point(ray.at(start)), map.vector(ray.dir), end - start)
+    Ray::new(map.point(ray.at(start)), map.vector(ray.dir)).until(end - start)
 }
 
 impl DensityField for DeformedGrid {

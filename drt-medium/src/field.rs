@@ -1,35 +1,9 @@
 use core::fmt::Debug;
 use core::ops::ControlFlow;
 
-use drt_math::{Rgb, Vec3};
+use drt_math::{Ray, Rgb, Vec3};
 
 use crate::{CoefficientGradients, Coefficients};
-
-/// The points `origin + t dir`, `0 < t < t_max`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ray {
-    /// Where t is zero.
-    pub origin: Vec3,
-    /// Unit direction.
-    pub dir: Vec3,
-    /// Length, in scene units; may be infinite.
-    pub t_max: f64,
-}
-
-impl Ray {
-    /// The points `origin + t dir`, `0 < t < t_max`.
-    #[inline]
-    #[must_use]
-    pub fn new(origin: impl Into<Vec3>, dir: impl Into<Vec3>, t_max: f64) -> Self {
-        Self { origin: origin.into(), dir: dir.into(), t_max }
-    }
-    /// The point at distance t.
-    #[inline]
-    #[must_use]
-    pub fn at(&self, t: f64) -> Vec3 {
-        self.origin + self.dir * t
-    }
-}
 
 /// A stretch of a ray with bounds of the extinction on it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -40,7 +40,7 @@ mod voxel_gradient;
 // What the public interface is made of, so that one dependency is enough.
 pub use drt_math;
 
-pub use drt_math::ValueChange;
+pub use drt_math::{Ray, ValueChange};
 
 pub use change::MediumChange;
 pub use coefficients::{CoefficientGradients, CoefficientRates, Coefficients};
@@ -48,7 +48,7 @@ pub use crossing::Crossing;
 pub use deformed::{DeformedGrid, SpaceMap};
 pub use depth::DepthEstimate;
 pub use error::{MediumError, Property};
-pub use field::{DensityField, Piece, Ray};
+pub use field::{DensityField, Piece};
 pub use flow::{Flow, FlowBasis, FlowPlace, NodeWeights};
 pub use gradient::{FieldGradient, FlowGradient, MediumGradient};
 pub use grid::Grid;

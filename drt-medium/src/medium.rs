@@ -398,42 +398,38 @@ impl Medium {
         }
     }
 
-    /// Samples a distance; see [`tracking::sample_distance`] and [`Homogeneous::free_flight_pdf`]
+    /// Samples a distance along a ray of unit direction; see [`tracking::sample_distance`] and [`Homogeneous::free_flight_pdf`]
     /// for the densities. `channels` are the nonnegative weights of the colour channels
     /// (throughput). `defensive` in [0, 1) is the share of events placed without regard to the
     /// present extinction, as derivatives with respect to it need; 0 is plain free flight.
     #[inline]
-    #[expect(clippy::too_many_arguments, reason = "a ray, three choices and two sinks")]
     pub fn sample_distance(
         &self,
-        origin: Vec3,
-        dir: Vec3,
-        t_max: f64,
+        ray: &Ray,
         channels: Rgb,
         defensive: f64,
         rng: &mut Rng,
         stats: &mut TrackingStats,
     ) -> DistanceSample {
-        let ray = Ray::new(origin, dir, t_max);
-        if let Some(directed) = self.directed(dir) {
+        if let Some(directed) = self.directed(ray.dir) {
             return match directed.even() {
-                Some(h) => h.sample_distance(t_max, channels, defensive, rng),
-                None => tracking::sample_distance(&directed, &ray, channels, defensive, rng, stats),
+                Some(h) => h.sample_distance(ray.t_max, channels, defensive, rng),
+                None => tracking::sample_distance(&directed, ray, channels, defensive, rng, stats),
             };
         }
         match &self.kind {
             MediumKind::Homogeneous(h)
             | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => {
-                h.sample_distance(t_max, channels, defensive, rng)
+                h.sample_distance(ray.t_max, channels, defensive, rng)
             }
             MediumKind::Grid(g) => {
-                tracking::sample_distance(g, &ray, channels, defensive, rng, stats)
+                tracking::sample_distance(g, ray, channels, defensive, rng, stats)
             }
             MediumKind::Deformed(d) => {
-                tracking::sample_distance(d, &ray, channels, defensive, rng, stats)
+                tracking::sample_distance(d, ray, channels, defensive, rng, stats)
             }
             MediumKind::Custom(f) => {
-                tracking::sample_distance(&**f, &ray, channels, defensive, rng, stats)
+                tracking::sample_distance(&**f, ray, channels, defensive, rng, stats)
             }
         }
     }
@@ -460,54 +456,40 @@ impl Medium {
         }
     }
 
-    /// Transmittance of the segment: exact where the extinction is the same everywhere, otherwise an
+    /// Transmittance of a ray of unit direction: exact where the extinction is the same everywhere, otherwise an
     /// unbiased estimate.
     #[inline]
-    pub fn transmittance(
-        &self,
-        origin: Vec3,
-        dir: Vec3,
-        t_max: f64,
-        rng: &mut Rng,
-        stats: &mut TrackingStats,
-    ) -> Rgb {
-        let ray = Ray::new(origin, dir, t_max);
-        if let Some(directed) = self.directed(dir) {
+    pub fn transmittance(&self, ray: &Ray, rng: &mut Rng, stats: &mut TrackingStats) -> Rgb {
+        if let Some(directed) = self.directed(ray.dir) {
             return match directed.even() {
-                Some(h) => h.transmittance(t_max),
-                None => tracking::transmittance(&directed, &ray, rng, stats),
+                Some(h) => h.transmittance(ray.t_max),
+                None => tracking::transmittance(&directed, ray, rng, stats),
             };
         }
         match &self.kind {
             MediumKind::Homogeneous(h)
-            | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => h.transmittance(t_max),
-            MediumKind::Grid(g) => tracking::transmittance(g, &ray, rng, stats),
-            MediumKind::Deformed(d) => tracking::transmittance(d, &ray, rng, stats),
-            MediumKind::Custom(f) => tracking::transmittance(&**f, &ray, rng, stats),
+            | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => {
+                h.transmittance(ray.t_max)
+            }
+            MediumKind::Grid(g) => tracking::transmittance(g, ray, rng, stats),
+            MediumKind::Deformed(d) => tracking::transmittance(d, ray, rng, stats),
+            MediumKind::Custom(f) => tracking::transmittance(&**f, ray, rng, stats),
         }
     }
 
-    /// Points and weights `(t, w)` such that `sum w h(t)` estimates `∫_0^t_max h(t) dt` without
+    /// Points and weights `(t, w)` on a ray of unit direction such that `sum w h(t)` estimates `∫_0^t_max h(t) dt` without
     /// bias for an h that vanishes where the medium's box is not; appended to `out`. A medium of one
     /// extinction, whose integrals have closed forms, adds none, and one without a box none to an infinite ray.
-    pub fn line_points(
-        &self,
-        origin: Vec3,
-        dir: Vec3,
-        t_max: f64,
-        rng: &mut Rng,
-        out: &mut Vec<(f64, f64)>,
-    ) {
-        let ray = Ray::new(origin, dir, t_max);
+    pub fn line_points(&self, ray: &Ray, rng: &mut Rng, out: &mut Vec<(f64, f64)>) {
         match &self.kind {
             MediumKind::Homogeneous(_) | MediumKind::Uniform(_) => {
-                if let Some(directed) = self.directed(dir).filter(|_| t_max.is_finite()) {
-                    tracking::line_points(&directed, &ray, rng, out);
+                if let Some(directed) = self.directed(ray.dir).filter(|_| ray.t_max.is_finite()) {
+                    tracking::line_points(&directed, ray, rng, out);
                 }
             }
-            MediumKind::Grid(g) => tracking::line_points(g, &ray, rng, out),
-            MediumKind::Deformed(d) => tracking::line_points(d, &ray, rng, out),
-            MediumKind::Custom(f) => tracking::line_points(&**f, &ray, rng, out),
+            MediumKind::Grid(g) => tracking::line_points(g, ray, rng, out),
+            MediumKind::Deformed(d) => tracking::line_points(d, ray, rng, out),
+            MediumKind::Custom(f) => tracking::line_points(&**f, ray, rng, out),
         }
     }
 

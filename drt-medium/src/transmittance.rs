@@ -9,6 +9,7 @@ use crate::{DepthEstimate, Medium, MediumTangent, Ray, TrackingStats};
 
 /// An unbiased estimate of a transmittance and of its derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TransmittanceRate {
     /// The transmittance.
     pub value: Rgb,
@@ -31,7 +32,7 @@ impl Medium {
             return rate.map(|r| if r == 0.0 { 0.0 } else { r * ray.t_max });
         }
         points.clear();
-        self.line_points(ray.origin, ray.dir, ray.t_max, rng, points);
+        self.line_points(ray, rng, points);
         let moving = tangent.moves_grids();
         let depth = DepthEstimate::inside(self, *ray, points, moving);
         let depth = if moving { depth.with_faces(self) } else { depth };
@@ -48,7 +49,7 @@ impl Medium {
         stats: &mut TrackingStats,
         points: &mut Vec<(f64, f64)>,
     ) -> TransmittanceRate {
-        let value = self.transmittance(ray.origin, ray.dir, ray.t_max, rng, stats);
+        let value = self.transmittance(ray, rng, stats);
         let depth = self.optical_depth_rate(ray, tangent, rng, points);
         let rate = crate::tracking::zip(value, depth, |t, d| if t == 0.0 { 0.0 } else { -t * d });
         TransmittanceRate { value, rate }
@@ -74,7 +75,7 @@ impl Medium {
             return [-end, end];
         }
         points.clear();
-        self.line_points(ray.origin, ray.dir, length, rng, points);
+        self.line_points(ray, rng, points);
         let e = DepthEstimate::inside(self, *ray, points, true).with_faces(self);
         let end = (e.moment + e.depth().outer(ray.dir) + e.turn) * (1.0 / length);
         [e.gradient - end, end]

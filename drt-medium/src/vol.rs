@@ -68,10 +68,23 @@ pub fn decode(bytes: &[u8], file: &str) -> Result<VolFile, VolError> {
 /// As [`read`], but for the number of channels, which is six.
 pub fn read_matrices(path: impl AsRef<Path>) -> Result<[VolFile; 2], VolError> {
     let (file, length, open) = open(path)?;
-    let (header, values) = values_from(open, length, &file, &[6])?;
+    matrices_from(open, length, &file)
+}
+
+/// Reads the content of a file of symmetric matrices as [`read_matrices`] does; `file` names it in errors.
+///
+/// # Errors
+/// As [`read_matrices`].
+pub fn decode_matrices(bytes: &[u8], file: &str) -> Result<[VolFile; 2], VolError> {
+    matrices_from(bytes, bytes.len() as u64, file)
+}
+
+/// Reads a file of matrices of a length.
+fn matrices_from(from: impl Read, length: u64, file: &str) -> Result<[VolFile; 2], VolError> {
+    let (header, values) = values_from(from, length, file, &[6])?;
     let part = |first: usize| -> Result<VolFile, VolError> {
         let own = values.chunks_exact(6).flat_map(|six| six[first..first + 3].iter().copied());
-        header.grid(3, own.collect(), &file)
+        header.grid(3, own.collect(), file)
     };
     Ok([part(0)?, part(3)?])
 }

@@ -3,6 +3,7 @@ use thiserror::Error;
 /// A change that cannot be applied: which parameter, which change, and why.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error("parameter {parameter}, `{change}`: {cause}")]
+#[non_exhaustive]
 pub struct MotionError {
     /// Index of the parameter in the list of all parameters.
     pub parameter: usize,

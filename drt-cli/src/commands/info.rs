@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use drt_estimators::emitter::Emitter;
+use drt_estimators::filter::FilterKind;
 use drt_estimators::texture::Texture;
 use drt_estimators::{Integrator, MediumBoundary, Plan, Scene, Shape, Surrounding};
 use drt_geom::{EdgeClass, Mesh, Topology};
@@ -297,7 +298,7 @@ fn sensors(job: &Job) -> Table<6> {
         [
             name(s.id.as_ref(), "sensor", i),
             format!("{w}x{h}"),
-            format!("{:?}", s.item.sensor.filter().kind()),
+            filter(s.item.sensor.filter().kind()),
             if s.item.sensor.is_orthographic() {
                 let width = s.item.sensor.pinhole().pixel_size * f64::from(w);
                 format!("orthographic, {width:.4} wide")
@@ -312,6 +313,20 @@ fn sensors(job: &Job) -> Table<6> {
         ]
     });
     Table::new(["sensor", "film", "filter", "field of view", "medium", "role"], rows)
+}
+
+/// What Mitsuba calls a filter, with its numbers.
+fn filter(kind: FilterKind) -> String {
+    match kind {
+        FilterKind::Box { radius } => format!("box, radius {radius}"),
+        FilterKind::Tent { radius } => format!("tent, radius {radius}"),
+        FilterKind::Gaussian { radius, std_dev } => {
+            format!("gaussian, stddev {std_dev}, radius {radius}")
+        }
+        FilterKind::Mitchell { b, c } => format!("mitchell, B {b}, C {c}"),
+        FilterKind::Lanczos { lobes } => format!("lanczos, {lobes} lobes"),
+        other => format!("{other:?}"),
+    }
 }
 
 fn parameters(parameters: &[Parameter<String>]) -> Table<4> {

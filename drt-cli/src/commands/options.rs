@@ -65,7 +65,7 @@ pub(super) struct PreviewOptions {
 
 #[derive(Args, Debug)]
 pub(super) struct ViewOptions {
-    /// An image file: OpenEXR, PNG, JPEG, BMP or Radiance (.hdr).
+    /// An image file: OpenEXR, PNG, JPEG, BMP, PFM or Radiance (.hdr).
     pub(super) input: PathBuf,
     /// Width of the picture in characters. Default: as wide as it has pixels and the terminal has room for.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]

@@ -12,8 +12,8 @@ use super::options::{Layers, ViewOptions};
 use super::preview::chosen;
 use super::{Outcome, console};
 use crate::error::Place;
-use crate::files::image::{Canvas, show_layers};
-use crate::files::{input_file, memory};
+use crate::files::image::{Canvas, NamedLayer, show_layers};
+use crate::files::{input_file, memory, pfm};
 use crate::{CliError, read_exr};
 
 /// Characters in a line of what is not a terminal.
@@ -53,17 +53,25 @@ fn half_blocks(picture: &RgbImage, width: u32) -> String {
 /// The picture to show: layers of an OpenEXR file as `drt preview` shows them, and of other files their pixels.
 fn picture(path: &Path, layers: &Layers) -> Result<RgbImage, CliError> {
     let fail = |e: &dyn std::fmt::Display| CliError::input(&Place::file(path), e);
+    let light = |size, named: &[NamedLayer<'_>]| {
+        shown(show_layers(size, named, layers.look.tone(None))).ok_or_else(|| fail(&"it is empty"))
+    };
+    let plain = || match layers.names.first() {
+        Some(name) => {
+            Err(fail(&format!("it has no layer `{name}`; only OpenEXR files have layers")))
+        }
+        None => Ok(()),
+    };
+    if let Some((size, pixels)) = pfm::read(path).map_err(|e| fail(&e))? {
+        return plain().and_then(|()| light(size, &[("", &pixels)]));
+    }
     let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
     let reader = reader.map_err(|e| fail(&e))?;
     let Some(format) = reader.format().filter(|format| *format != ImageFormat::OpenExr) else {
         let file = read_exr(path)?;
-        let layers = (chosen(path, &file, &layers.names)?, layers.look.tone(None));
-        return shown(show_layers(file.size, &layers.0, layers.1))
-            .ok_or_else(|| fail(&"it is empty"));
+        return light(file.size, &chosen(path, &file, &layers.names)?);
     };
-    if let Some(name) = layers.names.first() {
-        return Err(fail(&format!("it has no layer `{name}`; only OpenEXR files have layers")));
-    }
+    plain()?;
     let decoder = reader.into_decoder().map_err(|e| fail(&e))?;
     memory::check(u128::from(decoder.total_bytes()))
         .map_err(|e| fail(&format!("its pixels {e}")))?;
@@ -74,11 +82,9 @@ fn picture(path: &Path, layers: &Layers) -> Result<RgbImage, CliError> {
             |option| fail(&format!("{option}: it holds no light, but colours of a screen"));
         return option.map_or(Ok(image.into_rgb8()), |option| Err(exposed(option)));
     }
-    let light = image.into_rgb32f();
-    let pixels: Vec<[f32; 3]> = light.pixels().map(|p| p.0).collect();
-    let size = [light.width(), light.height()];
-    shown(show_layers(size, &[("", &pixels)], layers.look.tone(None)))
-        .ok_or_else(|| fail(&"it is empty"))
+    let image = image.into_rgb32f();
+    let pixels: Vec<[f32; 3]> = image.pixels().map(|p| p.0).collect();
+    light([image.width(), image.height()], &[("", &pixels)])
 }
 
 /// A picture that has pixels.

@@ -77,11 +77,11 @@ mod tests {
     #[test]
     fn meshes_come_back() {
         for mesh in [procedural::icosphere(1).with_smooth_normals(), procedural::uv_sphere(6)] {
-            let read = drt_geom::load_ply(&ply(&mesh), "mesh.ply").unwrap();
+            let read = drt_geom::decode_ply(&ply(&mesh), "mesh.ply").unwrap();
             let (positions, _) = in_file_order(&mesh);
             assert_eq!(in_file_order(&read).0, positions);
             assert_eq!(read.triangles.len(), mesh.triangles.len());
-            let read = drt_geom::load_obj(obj(&mesh).as_bytes(), "mesh.obj").unwrap();
+            let read = drt_geom::decode_obj(obj(&mesh).as_bytes(), "mesh.obj").unwrap();
             assert_eq!(in_file_order(&read).0, positions);
             assert_eq!(read.normals.is_some(), mesh.normals.is_some());
             assert_eq!(read.texcoords.is_some(), mesh.texcoords.is_some());

@@ -11,4 +11,5 @@ pub mod measured_file;
 pub(crate) mod memory;
 pub mod mesh_file;
 pub mod npy;
+pub(crate) mod pfm;
 pub(crate) mod tensor_file;

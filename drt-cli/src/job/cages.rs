@@ -52,9 +52,9 @@ impl Cages {
         let bytes = input_file::read(path).map_err(|e| Refusal::unreadable(path, &e))?;
         let name = path.to_string_lossy();
         let mesh = if bytes.starts_with(b"ply") {
-            drt_geom::load_ply(&bytes, &name).map_err(|e| fail(e.to_string()))?
+            drt_geom::decode_ply(&bytes, &name).map_err(|e| fail(e.to_string()))?
         } else {
-            drt_geom::load_obj(&bytes, &name).map_err(|e| fail(e.to_string()))?
+            drt_geom::decode_obj(&bytes, &name).map_err(|e| fail(e.to_string()))?
         };
         Cage::new(&mesh).map_err(|cause| fail(format!("unusable as a `cage`: {cause}")))?;
         let mesh = Arc::new(mesh);

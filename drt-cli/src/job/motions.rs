@@ -124,7 +124,7 @@ fn tetrahedra(path: &Path) -> Result<TetMesh, Refusal> {
     for file in tetrahedra_files(path) {
         input_file::check(&file).map_err(|e| Refusal::unreadable(&file, &e))?;
     }
-    Ok(drt_geom::load_tet_mesh(path).map_err(|e| CliError::input(&Place::file(path), e))?)
+    Ok(drt_geom::read_tet_mesh(path).map_err(|e| CliError::input(&Place::file(path), e))?)
 }
 
 /// The files that hold the mesh of this one, which TetGen writes in two.

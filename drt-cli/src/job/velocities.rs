@@ -14,7 +14,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Vec3>, Refusal> {
     let place = Place::file(path);
     let bytes = input_file::read(path).map_err(|e| Refusal::unreadable(path, &e))?;
     if bytes.starts_with(b"ply") {
-        return drt_geom::read_vertex_vectors(&bytes, &path.to_string_lossy())
+        return drt_geom::decode_vertex_vectors(&bytes, &path.to_string_lossy())
             .map_err(|e| CliError::input(&place, e).into());
     }
     let text = std::str::from_utf8(&bytes).map_err(|_| {

@@ -13,6 +13,7 @@ use super::properties::Properties;
 use super::spectrum::{factor, scaled, srgb_to_linear};
 use super::volumes;
 use crate::files::memory;
+use crate::files::pfm::{self, Pixels};
 use crate::{CliError, read_exr};
 
 /// Images of more texels are refused: they would take gigabytes.
@@ -192,17 +193,17 @@ fn both_ways(
     }
 }
 
-/// Columns and rows, and values row by row from the top.
-pub(super) type Pixels = ([u32; 2], Vec<[f32; 3]>);
-
 /// Linear pixels of an image file, or those it holds where it is `raw`.
 pub(super) fn pixels(path: &Path, raw: bool) -> Result<Pixels, String> {
     if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr")) {
         return exr_pixels(path);
     }
+    if let Some((size, texels)) = pfm::read(path)? {
+        return Ok((small(size)?, texels));
+    }
     let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
     let reader = reader.map_err(|err| err.to_string())?;
-    // Only Radiance's format holds linear values.
+    // Of these formats only Radiance's holds linear values.
     let linear = raw || reader.format() == Some(image::ImageFormat::Hdr);
     // Sizes are known before anything is made room for.
     let decoder = reader.into_decoder().map_err(|err| err.to_string())?;

@@ -98,7 +98,7 @@ fn shapes_and_textures_are_fitted_beside_parameters() {
     assert!(values.starts_with("iteration,power,body,paint\n0,0.0,0.0,0.0\n"), "{values}");
     let text = String::from_utf8(bytes(&folder, "body.obj")).unwrap();
     let ply = bytes(&folder, "body.ply");
-    let mesh = drt_geom::load_ply(&ply, "body.ply").unwrap();
+    let mesh = drt_geom::decode_ply(&ply, "body.ply").unwrap();
     assert_eq!(text.lines().filter(|l| l.starts_with("v ")).count(), mesh.positions.len());
     // It has grown where the camera sees it.
     let radius = mesh.positions.iter().map(|p| p.length()).fold(0.0, f64::max);

@@ -11,4 +11,6 @@ mod looks;
 mod mpi;
 mod optimize;
 mod shards;
+#[cfg(feature = "tetgen")]
+mod tetgen;
 mod textures;

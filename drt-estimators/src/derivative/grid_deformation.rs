@@ -10,8 +10,8 @@ use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
 use drt_geom::{Mesh, TetrahedralizeInput, tetrahedralize};
-use drt_math::{Affine, Mat3, Vec3};
-use drt_medium::{Flow, FlowBasis, Medium, NodeWeights, Ray, SpaceMap};
+use drt_math::{Affine, Mat3, Ray, Vec3};
+use drt_medium::{Flow, FlowBasis, Medium, NodeWeights, SpaceMap};
 use drt_motion::deformation::Deformation;
 use drt_motion::interior::{Carrier, MARGIN, TetrahedralField};
 use drt_motion::parameter::Applied;

@@ -17,6 +17,7 @@ use crate::world::World;
 
 /// The gradient of a loss with respect to a scene. Entries that were not asked for are `None`.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct SceneGradient {
     /// Per shape: with respect to its vertices (in mesh order), and to its vertex normals where it
     /// has any. [`SceneGradient::vertices`] folds the normals into positions.

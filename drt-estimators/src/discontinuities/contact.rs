@@ -18,8 +18,8 @@
 
 use core::f64::consts::{PI, TAU};
 
-use drt_geom::{Ray, Skip};
-use drt_math::{Real, Vec3, fm};
+use drt_geom::Skip;
+use drt_math::{Ray, Real, Vec3, fm};
 
 use crate::discontinuities::edge::{Edge, EdgePoint};
 use crate::discontinuities::intersection_faces::Sheets;

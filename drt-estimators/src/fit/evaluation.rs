@@ -19,6 +19,7 @@ const SQUARE: u32 = 4;
 /// Image and derivatives of a view from half of the samples.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct Half {
     /// Row by row from the top left.
     pub image: Vec<Rgb>,

@@ -188,6 +188,7 @@ impl Counters {
 /// A contribution that was not a finite number, with the random numbers that reproduce it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct NonFinite {
     /// The term that it belongs to; `None` is the image itself.
     pub term: Option<Term>,

@@ -21,7 +21,7 @@ mod view;
 mod viewpoint;
 mod window;
 
-use drt_math::{Affine, Mat3, Vec3, fm};
+use drt_math::{Affine, Mat3, Ray, Vec3, fm};
 use thiserror::Error;
 
 use crate::model::filter::{Filter, FilterError};
@@ -136,17 +136,6 @@ pub struct Sensor {
     response: Response,
     /// `None` for a pinhole.
     aperture: Option<Aperture>,
-}
-
-/// A ray into the scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CameraRay {
-    /// The pinhole, or the point of an orthographic camera's film.
-    pub origin: Vec3,
-    /// Unit vector into the scene; light flows against it.
-    pub direction: Vec3,
-    /// Distances along the ray at which it crosses the near and the far clip plane.
-    pub range: [f64; 2],
 }
 
 /// The camera-to-world map of a camera at `origin` that looks at `target`; its columns are left, up, forward, as in
@@ -295,20 +284,18 @@ impl Sensor {
         &self.filter
     }
 
-    /// The ray through an image point, in pixel coordinates.
+    /// The ray into the scene through an image point, in pixel coordinates, with unit direction; light flows against it. It ends at
+    /// the far clip plane. It starts at the pinhole, and crosses the near plane after near / far of its length; that of an
+    /// orthographic camera starts on the near plane.
     #[inline]
     #[must_use]
-    pub fn ray(&self, pixel: [f64; 2]) -> CameraRay {
+    pub fn ray(&self, pixel: [f64; 2]) -> Ray {
         if self.is_orthographic() {
             return self.parallel_ray(pixel);
         }
         let v = self.pinhole.view(pixel);
         let length = v.length();
-        CameraRay {
-            origin: self.pinhole.position,
-            direction: v / length,
-            range: [self.lens.near * length, self.lens.far * length],
-        }
+        Ray::new(self.pinhole.position, v / length).until(self.lens.far * length)
     }
 
     /// Where the camera sees the point x, visibility apart; `None` beyond a clip plane.

@@ -1,7 +1,7 @@
 //! Where paths stop along a ray: free flight through media, and vertices placed by other densities
 //! that compete with it.
 
-use drt_math::{Rgb, Vec3, fm, warp};
+use drt_math::{Ray, Rgb, Vec3, fm, warp};
 use drt_medium::{Coefficients, DistanceSample, TrackingStats};
 
 use crate::sampling::trace::{Flight, Tracer};
@@ -25,12 +25,12 @@ impl Tracer<'_> {
             for (i, interval) in intervals(ray.medium, &ray.crossings, ray.length).enumerate() {
                 let Some(m) = interval.medium else { continue };
                 let medium = world.medium(m);
-                let start = origin + dir * interval.start;
                 let length = interval.end - interval.start;
+                let part = Ray::new(origin + dir * interval.start, dir).until(length);
                 let mut stats = TrackingStats::default();
                 let rng = &mut self.rng;
                 let sample = if world.tracking[m] == Tracking::Attenuation {
-                    let weight = medium.transmittance(start, dir, length, rng, &mut stats);
+                    let weight = medium.transmittance(&part, rng, &mut stats);
                     DistanceSample::Pass { weight }
                 } else if let Some((other, excess)) = world.drawn_by(m) {
                     let defensive = world.defensive_where_thin(m, other);
@@ -42,7 +42,7 @@ impl Tracer<'_> {
                 } else {
                     let channels = (channels * passed).abs();
                     let defensive = world.defensive[m];
-                    medium.sample_distance(start, dir, length, channels, defensive, rng, &mut stats)
+                    medium.sample_distance(&part, channels, defensive, rng, &mut stats)
                 };
                 self.counters.tracking_steps += stats.lookups;
                 match sample {
@@ -51,7 +51,7 @@ impl Tracer<'_> {
                         depth += proxy_extinction(world, m, None) * length;
                     }
                     DistanceSample::Scatter { t, weight, .. } => {
-                        let x = start + dir * t;
+                        let x = part.at(t);
                         depth += proxy_extinction(world, m, None) * t;
                         let vertex = Vertex { x, medium: Some(m), kind: Kind::Volume(None) };
                         return Travel::Volume(Flown {

@@ -2,8 +2,8 @@
 
 use alloc::vec::Vec;
 
-use drt_geom::{Hit, Ray, Skip, coincide};
-use drt_math::{Rgb, Rng, Vec3};
+use drt_geom::{Hit, Skip, coincide};
+use drt_math::{Ray, Rgb, Rng, Vec3};
 use drt_medium::TrackingStats;
 
 use crate::model::rendering::Counters;
@@ -335,8 +335,8 @@ impl World {
         for i in intervals(path.medium, &path.crossings, path.length) {
             if let Some(m) = i.medium {
                 let mut stats = TrackingStats::default();
-                let start = origin + dir * i.start;
-                tau *= self.medium(m).transmittance(start, dir, i.end - i.start, rng, &mut stats);
+                let part = Ray::new(origin + dir * i.start, dir).until(i.end - i.start);
+                tau *= self.medium(m).transmittance(&part, rng, &mut stats);
                 counters.tracking_steps += stats.lookups;
                 if tau.is_zero() {
                     break;

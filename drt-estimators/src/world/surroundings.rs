@@ -2,8 +2,8 @@
 
 use alloc::vec::Vec;
 
-use drt_geom::{Aabb, Hit, Ray, Skip};
-use drt_math::{Rgb, Vec3};
+use drt_geom::{Aabb, Hit, Skip};
+use drt_math::{Ray, Rgb, Vec3};
 
 use crate::model::scene::Surrounding;
 use crate::world::vertex::{Contact, Kind, SurfacePoint, Vertex};

@@ -7,7 +7,7 @@ use drt_estimators::surface::{Bsdf, Diffuse};
 use drt_estimators::{Scene, SceneBuilder, ShapeBuilder};
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Rgb, Vec3};
-use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, ValueChange};
+use drt_motion::{GeometryChange, Parameter, PropertyChange, ValueChange};
 
 /// The scene of a builder, as a sensor sees it.
 pub(crate) fn seen(scene: SceneBuilder, sensor: Sensor) -> Scene {
@@ -47,21 +47,17 @@ pub(crate) fn pixel(
 }
 
 pub(crate) fn moves(name: &str, target: &str, velocity: [f64; 3]) -> Parameter {
-    parameter(name, target, Change::Geometry(GeometryChange::Translate(Vec3::from(velocity))))
+    let change = GeometryChange::Translate(Vec3::from(velocity));
+    Parameter::new(name).effect(target, change)
 }
 
 pub(crate) fn deforms(name: &str, target: &str, velocities: &[[f64; 3]]) -> Parameter {
     let velocities: Vec<_> = velocities.iter().copied().map(Vec3::from).collect();
-    parameter(name, target, Change::Geometry(GeometryChange::VertexVelocity(velocities.into())))
+    let change = GeometryChange::VertexVelocity(velocities.into());
+    Parameter::new(name).effect(target, change)
 }
 
 pub(crate) fn grows(name: &str, target: &str, property: &str) -> Parameter {
     let op = ValueChange::Add(Rgb::splat(1.0));
-    let change = PropertyChange { property: property.into(), op, voxels: None, texels: None };
-    parameter(name, target, Change::Property(change))
-}
-
-fn parameter(name: &str, target: &str, change: Change) -> Parameter {
-    let effects = vec![Effect { target: target.into(), change }];
-    Parameter { name: name.into(), value: 0.0, effects }
+    Parameter::new(name).effect(target, PropertyChange::new(property, op))
 }

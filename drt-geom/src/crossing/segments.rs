@@ -17,6 +17,7 @@ const PARALLEL: f64 = 1e-4;
 
 /// A segment along which two surfaces, or two parts of one, pass through each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct CrossingSegment {
     /// Where it starts and ends.
     pub ends: [Vec3; 2],

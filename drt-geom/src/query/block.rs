@@ -103,10 +103,9 @@ pub(super) fn chain(twins: &[Twin], first: u32) -> impl Iterator<Item = &Twin> {
 
 #[cfg(test)]
 mod tests {
-    use drt_math::{Rng, vec3};
+    use drt_math::{Ray, Rng, vec3};
 
     use super::{BLOCK, Block};
-    use crate::Ray;
     use crate::query::lanes::{Lanes, Machine, Task};
     use crate::query::watertight::ShearedRay;
 

@@ -14,9 +14,8 @@
 
 use alloc::vec::Vec;
 
-use drt_math::{Real, Vec3};
+use drt_math::{Ray, Real, Vec3};
 
-use super::ray::Ray;
 use crate::Aabb;
 
 /// What planes are moved by, relative to the coordinates of a plane or of a ray's origin.

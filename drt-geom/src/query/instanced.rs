@@ -8,7 +8,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::{ControlFlow, Range};
 
-use drt_math::{Affine, Real, Vec3, vec3};
+use drt_math::{Affine, Ray, Real, Vec3, vec3};
 
 use super::binary::BvhBuilder;
 use super::collapse::collapse;
@@ -16,7 +16,7 @@ use super::ends::{End, gamma};
 use super::frame::{Box32, BoxFrame};
 use super::lanes::{Lanes, Machine};
 use super::wide::{Visitor, WideTree};
-use super::{BvhError, Hit, Ray, Skip, TriangleBvh, Walk, sort};
+use super::{BvhError, Hit, Skip, TriangleBvh, Walk, sort};
 use crate::{Aabb, NONE, is_usable};
 
 /// Instances in a leaf of the tree.

@@ -3,6 +3,8 @@
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
+use drt_math::Ray;
+
 use self::block::{Block, Twin};
 use self::ends::End;
 use self::frame::{BoxFrame, BoxRay};
@@ -20,6 +22,7 @@ mod children;
 mod collapse;
 mod ends;
 mod frame;
+mod hit;
 mod instanced;
 mod lanes;
 mod nearest;
@@ -27,7 +30,6 @@ mod node;
 mod order;
 #[cfg(feature = "obvhs")]
 mod ploc;
-mod ray;
 mod registers;
 #[cfg(test)]
 mod tests;
@@ -38,10 +40,10 @@ mod winding;
 pub use binary::BvhBuilder;
 pub(crate) use boxes::BoxTree;
 pub use build::BvhError;
+pub use hit::{Hit, Skip};
 pub use instanced::{InstancePlacement, InstancedBvh};
 pub use nearest::{ClosestPoint, nearest_point};
 pub use order::coincide;
-pub use ray::{Hit, Ray, Skip};
 pub(crate) use registers::{Registers, Work};
 
 /// A bounding volume hierarchy over triangles, for rays and nearest points.
@@ -53,7 +55,7 @@ pub(crate) use registers::{Registers, Work};
 /// the ray starts or ends are excluded by number ([`Skip`]), and their neighbours by a rounding
 /// error bound when the ray's end lies on them too (at a shared edge or vertex); see
 /// [`Hit::point`] for how to make such origins. Hits on other triangles are never dropped for
-/// being near.
+/// being near. A ray with a NaN, or with a zero or infinite direction, meets nothing.
 ///
 /// Triangles of zero area have no normal and are never hit. Of hits at equal `t` the one on the
 /// triangle with the lower number comes first, so that results do not depend on the tree.

@@ -12,6 +12,7 @@ use crate::NONE;
 /// The point of a surface nearest to a given one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub struct ClosestPoint {
     /// The point on the surface.
     pub point: Vec3,

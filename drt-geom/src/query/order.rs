@@ -7,11 +7,11 @@
 
 use alloc::vec::Vec;
 
-use drt_math::Vec3;
+use drt_math::{Ray, Vec3};
 
+use super::Hit;
 use super::ends::{End, gamma};
 use super::watertight::{Corners, Crossing};
-use super::{Hit, Ray};
 
 /// How near two hits are that are looked at more closely, relative to their distance.
 const NEAR: f64 = 1e-6;

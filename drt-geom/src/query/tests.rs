@@ -2,11 +2,11 @@
 
 use core::ops::ControlFlow;
 
-use drt_math::{Rng, Vec3, vec3};
+use drt_math::{Ray, Rng, Vec3, vec3};
 
 use super::lanes::Lanes;
 use super::wide::Visitor;
-use super::{BoxTree, Ray, Skip, TriangleBvh, Walk};
+use super::{BoxTree, Skip, TriangleBvh, Walk};
 use crate::{Aabb, procedural};
 
 /// Counts blocks that a walk comes to.

@@ -10,9 +10,7 @@
 //! "Simulation of Simplicity"), the same for all triangles: it crosses exactly one of two neighbours
 //! that lie on both sides of it, and a closed surface as often inward as outward.
 
-use drt_math::Vec3;
-
-use super::ray::Ray;
+use drt_math::{Ray, Vec3};
 
 /// A triangle by its corners, as arrays so that the permuted axes can index them.
 pub(super) type Corners = [[f64; 3]; 3];

@@ -1,8 +1,8 @@
 use core::ops::ControlFlow;
 
-use drt_math::{Vec3, vec3};
+use drt_math::{Ray, Vec3, vec3};
 
-use super::{Ray, Skip, TriangleBvh};
+use super::{Skip, TriangleBvh};
 
 /// Any direction does; one askew of the axes meets fewer of the edges of boxes and grids.
 const DIRECTION: Vec3 = vec3(0.297, 0.539, 0.788);

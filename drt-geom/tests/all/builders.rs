@@ -91,7 +91,7 @@ fn agree_on_files(folder: &std::path::Path, rays: usize) {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|e| e == "obj") {
             let name = path.display().to_string();
-            let mesh = drt_geom::load_obj(&std::fs::read(&path).unwrap(), &name).unwrap();
+            let mesh = drt_geom::read_obj(&path).unwrap();
             agree(&name, &mesh, rays);
             count += 1;
         }

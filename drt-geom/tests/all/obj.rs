@@ -1,10 +1,10 @@
 //! OBJ files, right and wrong.
 
-use drt_geom::{Mesh, MeshError, ObjErrorKind, PolygonError, Topology, load_obj};
+use drt_geom::{Mesh, MeshError, ObjErrorKind, PolygonError, Topology, decode_obj, read_obj};
 use drt_math::{Rng, Vec3, vec3};
 
 fn load(text: &str) -> Result<Mesh, drt_geom::ObjError> {
-    load_obj(text.as_bytes(), "test.obj")
+    decode_obj(text.as_bytes(), "test.obj")
 }
 
 const CUBE: &str = "# a cube
@@ -84,7 +84,7 @@ fn what_is_not_read_is_passed_over() {
     assert_eq!(m.triangles, [[0, 1, 2], [0, 1, 2], [2, 1, 3]]);
     assert_eq!((m.source_vertices, m.source_vertex_count), (Some(vec![0, 1, 2, 4]), 5));
     let bytes = b"o \xff\xfe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 # \xff\n";
-    assert_eq!(load_obj(bytes, "latin").unwrap().triangles, [[0, 1, 2]]);
+    assert_eq!(decode_obj(bytes, "latin").unwrap().triangles, [[0, 1, 2]]);
 }
 
 type Expected = fn(&ObjErrorKind) -> bool;
@@ -139,7 +139,7 @@ fn wrong_lines_are_named() {
 fn damaged_files_never_panic() {
     let mut rng = Rng::new(1, 0, 0);
     for end in 0..CUBE.len() {
-        let _ = load_obj(&CUBE.as_bytes()[..end], "cut");
+        let _ = decode_obj(&CUBE.as_bytes()[..end], "cut");
     }
     for _ in 0..20_000 {
         let mut bytes = CUBE.as_bytes().to_vec();
@@ -147,8 +147,21 @@ fn damaged_files_never_panic() {
             let at = rng.next_u32() as usize % bytes.len();
             bytes[at] = (rng.next_u32() >> 24) as u8;
         }
-        if let Ok(m) = load_obj(&bytes, "damaged") {
+        if let Ok(m) = decode_obj(&bytes, "damaged") {
             assert!(Mesh::new(m.positions, m.triangles).is_ok());
         }
     }
+}
+
+#[test]
+fn a_path_is_read_as_its_bytes_are() {
+    let path = std::env::temp_dir().join(format!("drt-geom-{}.obj", std::process::id()));
+    std::fs::write(&path, CUBE).unwrap();
+    let read = read_obj(&path);
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(read.unwrap(), decode_obj(CUBE.as_bytes(), "test").unwrap());
+    let error = read_obj(&path).unwrap_err();
+    assert!(
+        error.to_string().starts_with(&error.file) && error.to_string().contains("cannot be read")
+    );
 }

@@ -1,6 +1,6 @@
 //! PLY files in all encodings, right and wrong.
 
-use drt_geom::{Mesh, PlyErrorKind, PolygonError, load_ply, read_vertex_vectors};
+use drt_geom::{Mesh, PlyErrorKind, PolygonError, decode_ply, decode_vertex_vectors, read_ply};
 use drt_math::{Rng, Vec3, vec3};
 
 const ASCII: &str = "ply
@@ -67,25 +67,25 @@ fn binary(big: bool, with_normals: bool) -> Vec<u8> {
 
 #[test]
 fn text_with_other_properties_and_elements() {
-    let m = load_ply(ASCII.as_bytes(), "test.ply").unwrap();
+    let m = decode_ply(ASCII.as_bytes(), "test.ply").unwrap();
     assert_eq!((m.positions.len(), m.triangles.len()), (5, 6));
     assert!((m.volume() - 2.0).abs() < 1e-15);
     assert_eq!(m.source_vertices, None);
-    let v = read_vertex_vectors(ASCII.as_bytes(), "test.ply").unwrap();
+    let v = decode_vertex_vectors(ASCII.as_bytes(), "test.ply").unwrap();
     assert_eq!(v, m.positions);
     assert_eq!(v[4], vec3(0.0, 0.0, 1.5));
     let windows = ASCII.replace('\n', "\r\n");
-    assert_eq!(load_ply(windows.as_bytes(), "test.ply").unwrap(), m);
+    assert_eq!(decode_ply(windows.as_bytes(), "test.ply").unwrap(), m);
 }
 
 #[test]
 fn binary_of_either_order() {
     for big in [false, true] {
-        let plain = load_ply(&binary(big, false), "test.ply").unwrap();
+        let plain = decode_ply(&binary(big, false), "test.ply").unwrap();
         assert_eq!(plain.positions[2], vec3(1.1, 1.0, -3.0));
         assert_eq!(plain.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(plain.normals, None);
-        let smooth = load_ply(&binary(big, true), "test.ply").unwrap();
+        let smooth = decode_ply(&binary(big, true), "test.ply").unwrap();
         assert_eq!(smooth.positions, plain.positions);
         assert_eq!(smooth.normals, Some(vec![vec3(0.0, 0.6, 0.8); 4]));
     }
@@ -95,9 +95,9 @@ fn binary_of_either_order() {
 fn vectors_alone_need_no_faces() {
     let text = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n\
                 property float z\nend_header\n1 2 3\n-4 5e-1 6\n";
-    let v = read_vertex_vectors(text.as_bytes(), "v.ply").unwrap();
+    let v = decode_vertex_vectors(text.as_bytes(), "v.ply").unwrap();
     assert_eq!(v, [vec3(1.0, 2.0, 3.0), vec3(-4.0, 0.5, 6.0)]);
-    let error = load_ply(text.as_bytes(), "v.ply").unwrap_err();
+    let error = decode_ply(text.as_bytes(), "v.ply").unwrap_err();
     assert_eq!(error.kind, PlyErrorKind::Missing("faces"));
 }
 
@@ -107,7 +107,7 @@ fn unused_vertices_are_left_out() {
         .replace("7 4 3 2 1 0", "7 3 3 2 1")
         .replace("3 0 4", "3 3 4 2")
         .replace("3 0 1 4", "3 1 2 4");
-    let m = load_ply(text.as_bytes(), "test.ply").unwrap();
+    let m = decode_ply(text.as_bytes(), "test.ply").unwrap();
     assert_eq!(m.source_vertices, Some(vec![1, 2, 3, 4]));
     assert_eq!(m.source_vertex_count, 5);
 }
@@ -120,7 +120,7 @@ fn other_columns_become_attributes() {
                 element face 1\nproperty list uchar int vertex_indices\nproperty float heat_0\n\
                 end_header\n0 0 0 1 2 3 9 0 0\n1 0 0 4 5 6 9 0 0\n1 1 0 7 8 9 9 0 0\n\
                 0 1 0 0 1 0 9 0 0\n4 0 1 2 3 0.5\n";
-    let mut m = load_ply(text.as_bytes(), "a.ply").unwrap();
+    let mut m = decode_ply(text.as_bytes(), "a.ply").unwrap();
     let names: Vec<_> = m.attributes.iter().map(|a| a.name.as_str()).collect();
     // Neither lone columns nor pairs.
     assert_eq!(names, ["vertex_color", "face_heat"]);
@@ -172,11 +172,11 @@ fn wrong_files_are_named() {
     for (from, to, expected) in cases {
         let text = ASCII.replacen(from, to, 1);
         assert_ne!(text, ASCII);
-        let error = load_ply(text.as_bytes(), "test.ply").unwrap_err();
+        let error = decode_ply(text.as_bytes(), "test.ply").unwrap_err();
         assert!(expected(&error.kind), "{to}: {error}");
         assert!(error.to_string().starts_with("test.ply: "), "{error}");
     }
-    let error = load_ply(ASCII.replace("0 0 1.5", "0 x 1.5").as_bytes(), "a").unwrap_err();
+    let error = decode_ply(ASCII.replace("0 0 1.5", "0 x 1.5").as_bytes(), "a").unwrap_err();
     assert_eq!(error.place, "line 19, vertex 4 (from 0)");
 }
 
@@ -193,8 +193,8 @@ fn absurd_counts_cost_nothing() {
     ] {
         let mut bytes = format!("{small}{header}end_header\n").into_bytes();
         bytes.extend([255; 40]);
-        assert!(load_ply(&bytes, "absurd").is_err());
-        assert!(read_vertex_vectors(&bytes, "absurd").is_err() || header.contains("vertex 0"));
+        assert!(decode_ply(&bytes, "absurd").is_err());
+        assert!(decode_vertex_vectors(&bytes, "absurd").is_err() || header.contains("vertex 0"));
     }
 }
 
@@ -203,7 +203,7 @@ fn damaged_files_never_panic() {
     let mut rng = Rng::new(2, 0, 0);
     for whole in [ASCII.as_bytes().to_vec(), binary(false, true), binary(true, false)] {
         for end in 0..whole.len() - 1 {
-            let cut = load_ply(&whole[..end], "cut");
+            let cut = decode_ply(&whole[..end], "cut");
             assert!(cut.is_err() || end > whole.len() - 4, "{end}");
         }
         for _ in 0..10_000 {
@@ -212,10 +212,23 @@ fn damaged_files_never_panic() {
                 let at = rng.next_u32() as usize % bytes.len();
                 bytes[at] = (rng.next_u32() >> 24) as u8;
             }
-            if let Ok(m) = load_ply(&bytes, "damaged") {
+            if let Ok(m) = decode_ply(&bytes, "damaged") {
                 assert!(m.positions.iter().all(|p: &Vec3| p.is_finite()));
                 assert!(Mesh::new(m.positions, m.triangles).is_ok());
             }
         }
     }
+}
+
+#[test]
+fn a_path_is_read_as_its_bytes_are() {
+    let path = std::env::temp_dir().join(format!("drt-geom-{}.ply", std::process::id()));
+    std::fs::write(&path, ASCII).unwrap();
+    let read = read_ply(&path);
+    std::fs::remove_file(&path).unwrap();
+    assert_eq!(read.unwrap(), decode_ply(ASCII.as_bytes(), "test").unwrap());
+    let error = read_ply(&path).unwrap_err();
+    assert!(
+        error.to_string().starts_with(&error.file) && error.to_string().contains("cannot be read")
+    );
 }

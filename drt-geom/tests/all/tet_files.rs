@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use drt_geom::{
-    Aabb, TetFileError, TetFileErrorKind as Kind, TetMesh, load_tet_mesh, procedural, read_medit,
-    read_tetgen,
+    Aabb, TetFileError, TetFileErrorKind as Kind, TetMesh, decode_medit, decode_tetgen, procedural,
+    read_tet_mesh,
 };
 use drt_math::{Rng, Vec3, vec3};
 
@@ -52,11 +52,11 @@ fn two_tets() -> TetMesh {
 }
 
 fn tetgen(nodes: &str, tets: &str) -> Result<TetMesh, TetFileError> {
-    read_tetgen([(nodes.as_bytes(), "t.node"), (tets.as_bytes(), "t.ele")])
+    decode_tetgen([(nodes.as_bytes(), "t.node"), (tets.as_bytes(), "t.ele")])
 }
 
 fn medit(text: &str) -> Result<TetMesh, TetFileError> {
-    read_medit(text.as_bytes(), "t.mesh")
+    decode_medit(text.as_bytes(), "t.mesh")
 }
 
 #[test]
@@ -80,12 +80,12 @@ fn files_are_found_by_their_extension() {
         std::fs::write(path(name), text).unwrap();
     }
     for name in ["a.node", "a.ele", "b.mesh"] {
-        assert_eq!(load_tet_mesh(&path(name)).unwrap(), two_tets());
+        assert_eq!(read_tet_mesh(path(name)).unwrap(), two_tets());
     }
     std::fs::remove_file(path("a.node")).unwrap();
-    let error = load_tet_mesh(&path("a.ele")).unwrap_err();
+    let error = read_tet_mesh(path("a.ele")).unwrap_err();
     assert!(error.file.ends_with("a.node") && matches!(error.kind, Kind::Unreadable(_)), "{error}");
-    let error = load_tet_mesh(&path("b.msh")).unwrap_err();
+    let error = read_tet_mesh(path("b.msh")).unwrap_err();
     assert_eq!(error.kind, Kind::UnknownFormat);
     std::fs::remove_dir_all(&folder).unwrap();
 }
@@ -191,7 +191,7 @@ fn what_is_written_is_read_and_bytes_do_not_panic() {
     for _ in 0..3_000 {
         let [nodes, tets, text] = [&nodes, &tets, &text].map(|t| damaged(t.as_bytes(), &mut rng));
         let files = [(&nodes[..], "n"), (&tets[..], "t")];
-        for result in [read_tetgen(files), read_medit(&text, "m")] {
+        for result in [decode_tetgen(files), decode_medit(&text, "m")] {
             match result {
                 Ok(mesh) => {
                     accepted += 1;

@@ -43,7 +43,7 @@ fn ray(medium: &Medium, rng: &mut Rng, aligned: bool) -> Ray {
         from = vec3(to.x, to.y, -1.0);
     }
     let (from, to) = (place.point(from), place.point(to));
-    Ray::new(from, (to - from).normalize(), 4.0)
+    Ray::new(from, (to - from).normalize()).until(4.0)
 }
 
 fn pieces(medium: &Medium, ray: &Ray) -> Vec<Piece> {
@@ -95,7 +95,7 @@ fn empty_space_takes_few_steps() {
     let place = medium.grid().expect("a grid").density().to_world();
     let steps = |from: Vec3, to: Vec3| {
         let (from, to) = (place.point(from), place.point(to));
-        pieces(&medium, &Ray::new(from, (to - from).normalize(), (to - from).length())).len()
+        pieces(&medium, &Ray::new(from, (to - from).normalize()).until((to - from).length())).len()
     };
     let empty = steps(vec3(0.95, 0.1, -0.1), vec3(0.9, 0.15, 1.1));
     let cloud = steps(vec3(0.28, 0.43, -0.1), vec3(0.28, 0.43, 1.1));
@@ -108,7 +108,7 @@ fn light_gets_through_as_it_should() {
     let field = medium.grid().expect("a grid");
     let place = field.density().to_world();
     let (from, to) = (place.point(vec3(0.1, 0.35, -0.1)), place.point(vec3(0.7, 0.65, 1.1)));
-    let ray = Ray::new(from, (to - from).normalize(), (to - from).length());
+    let ray = Ray::new(from, (to - from).normalize()).until((to - from).length());
     let truth = (-optical_depth(&medium, &ray).g).exp();
     assert!((0.05..0.6).contains(&truth), "{truth}");
     let ratio = estimate(100_000, |rng, stats| tracking::transmittance(field, &ray, rng, stats).g);

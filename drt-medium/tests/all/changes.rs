@@ -312,7 +312,7 @@ fn one_voxel_keeps_the_bounds() {
     let grid = medium.grid().expect("a grid");
     assert!(grid.largest_sigma_t() > 50.0);
     for x in points(&medium) {
-        let ray = drt_medium::Ray::new(x - Vec3::Y * 3.0, Vec3::Y, 6.0);
+        let ray = drt_medium::Ray::new(x - Vec3::Y * 3.0, Vec3::Y).until(6.0);
         grid.pieces(&ray, &mut |p| {
             let sigma = medium.sigma_t(ray.at(0.5 * (p.start + p.end)));
             assert!(sigma.r <= p.majorant.r + 1e-12 && sigma.r >= p.minorant.r - 1e-12);

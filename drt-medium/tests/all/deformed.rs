@@ -79,9 +79,9 @@ fn bending() -> MediumTangent {
 fn rays() -> Vec<Ray> {
     let mut rays = Vec::from([vec3(0.9, 0.3, -0.2), vec3(-0.3, 0.8, 0.4)].map(|d| {
         let dir = d.normalize();
-        Ray::new(vec3(0.4, 0.3, 0.0) - dir * 3.0, dir, 6.0)
+        Ray::new(vec3(0.4, 0.3, 0.0) - dir * 3.0, dir).until(6.0)
     }));
-    rays.push(Ray::new(vec3(-3.0, -0.4, 0.05), vec3(1.0, 0.003, 0.001).normalize(), 7.0));
+    rays.push(Ray::new(vec3(-3.0, -0.4, 0.05), vec3(1.0, 0.003, 0.001).normalize()).until(7.0));
     // Ends inside.
     rays.push(Ray { t_max: 3.1, ..rays[0] });
     rays
@@ -119,14 +119,18 @@ fn walks_are_unbiased() {
     for ray in rays() {
         let truth = (-depth(&medium, &ray)).exp();
         let stats = &mut TrackingStats::default();
-        let passed = estimate(100_000, |rng, _| {
-            medium.transmittance(ray.origin, ray.dir, ray.t_max, rng, stats).g
-        });
+        let passed = estimate(100_000, |rng, _| medium.transmittance(&ray, rng, stats).g);
         assert_agrees("transmittance", &passed, truth.g, 0.01);
         assert_rejects("transmittance", &passed, truth.g * 1.05 + 0.02);
         let stopped = estimate(100_000, |rng, stats| {
             let Ray { origin, dir, t_max } = ray;
-            match medium.sample_distance(origin, dir, t_max, Rgb::ONE, 0.1, rng, stats) {
+            match medium.sample_distance(
+                &Ray::new(origin, dir).until(t_max),
+                Rgb::ONE,
+                0.1,
+                rng,
+                stats,
+            ) {
                 DistanceSample::Scatter { t, weight, .. } => (weight * medium.sigma_t(ray.at(t))).g,
                 DistanceSample::Pass { .. } => 0.0,
             }
@@ -225,7 +229,7 @@ fn gradients_by_nodes_are_the_transposes() {
         forward += tangent.rates(&medium, x).dot(&adjoint);
         gradient.scatter(&medium, x, &adjoint);
         points.clear();
-        medium.line_points(ray.origin, ray.dir, ray.t_max, rng, &mut points);
+        medium.line_points(&ray, rng, &mut points);
         let depth = DepthEstimate::inside(&medium, ray, &points, true).with_faces(&medium);
         forward += depth.rate(&medium, &tangent).dot(a);
         gradient.scatter_depth(&medium, &depth, a);

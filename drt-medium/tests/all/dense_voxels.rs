@@ -55,8 +55,14 @@ fn rays_beside_a_dense_voxel_are_not_slowed() {
                 let at = middle(layout) + vec3(near(), near(), near());
                 let from = vec3(rng.next_f64(), rng.next_f64(), -0.5);
                 let dir = (at - from).normalize();
-                medium.sample_distance(from, dir, 4.0, Rgb::ONE, 0.0, &mut rng, &mut stats);
-                medium.transmittance(from, dir, 4.0, &mut rng, &mut stats);
+                medium.sample_distance(
+                    &Ray::new(from, dir).until(4.0),
+                    Rgb::ONE,
+                    0.0,
+                    &mut rng,
+                    &mut stats,
+                );
+                medium.transmittance(&Ray::new(from, dir).until(4.0), &mut rng, &mut stats);
             }
             let each = cost(&stats) / u64::from(rays);
             let TrackingStats { pieces, lookups } = stats;
@@ -77,7 +83,7 @@ fn cuts_of_a_ray_are_bounded() {
     let grid = Grid::new([2; 3], 3, values).expect("valid");
     let medium = grid_medium(grid, 1.0, Rgb::ONE);
     let field = medium.grid().expect("a grid");
-    let ray = Ray::new(vec3(0.1, 0.1, -1.0), vec3(0.3, 0.2, 1.0).normalize(), 4.0);
+    let ray = Ray::new(vec3(0.1, 0.1, -1.0), vec3(0.3, 0.2, 1.0).normalize()).until(4.0);
     let (mut pieces, mut means) = (0, 0);
     let count = |n: &mut u32| {
         *n += 1;
@@ -89,8 +95,7 @@ fn cuts_of_a_ray_are_bounded() {
     assert!((100..1100).contains(&pieces), "{pieces} pieces");
     assert!(means <= 4, "{means} pieces for means");
     let mut stats = TrackingStats::default();
-    let through =
-        medium.transmittance(ray.origin, ray.dir, 4.0, &mut Rng::new(1, 2, 3), &mut stats);
+    let through = medium.transmittance(&ray, &mut Rng::new(1, 2, 3), &mut stats);
     println!("{stats:?}");
     assert_eq!(through, Rgb::new(0.0, 1.0, 1.0));
     assert!(cost(&stats) < 30_000, "{stats:?}");
@@ -108,22 +113,15 @@ fn dense_channels_do_not_hold_up_empty_ones() {
     for (values, blue, most, count) in cases {
         let grid = Grid::new([2; 3], 3, values).expect("valid");
         let medium = grid_medium(grid, 1.0, Rgb::ONE);
-        let ray = Ray::new(vec3(0.1, 0.1, -1.0), vec3(0.3, 0.2, 1.0).normalize(), 4.0);
+        let ray = Ray::new(vec3(0.1, 0.1, -1.0), vec3(0.3, 0.2, 1.0).normalize()).until(4.0);
         let length = clipped(&ray);
         for defensive in [0.0, 0.25] {
             let mut passed = [Moments::default(); 3];
             let mut stats = TrackingStats::default();
             for i in 0..count {
                 let mut rng = Rng::new(3, 1, i);
-                let sample = medium.sample_distance(
-                    ray.origin,
-                    ray.dir,
-                    ray.t_max,
-                    Rgb::ONE,
-                    defensive,
-                    &mut rng,
-                    &mut stats,
-                );
+                let sample =
+                    medium.sample_distance(&ray, Rgb::ONE, defensive, &mut rng, &mut stats);
                 let weight = match sample {
                     DistanceSample::Pass { weight } => weight,
                     DistanceSample::Scatter { .. } => Rgb::ZERO,
@@ -212,7 +210,7 @@ fn what_gets_past_a_dense_voxel_is_right() {
         let dir = vec3(0.6, 0.3, 0.74).normalize();
         let beside = |offset: f64| {
             let at = middle(layout) + vec3(1.0, 0.3, 0.0) * (offset / SIDE as f64);
-            Ray::new(at - dir * 2.0, dir, 4.0)
+            Ray::new(at - dir * 2.0, dir).until(4.0)
         };
         let depth = |ray: &Ray| match filter {
             Filter::Nearest => depth_of_box(DENSITY, layout, ray),
@@ -271,7 +269,7 @@ fn the_box_of_a_dense_voxel_is_sharp() {
         let medium = medium(1e5, layout, Filter::Nearest);
         for (offset, truth) in [(0.4, 0.0), (0.6, 1.0)] {
             let at = middle(layout) + vec3(offset, 0.4, 0.0) / SIDE as f64;
-            let ray = Ray::new(vec3(at.x, at.y, -0.5), Vec3::Z, 4.0);
+            let ray = Ray::new(vec3(at.x, at.y, -0.5), Vec3::Z).until(4.0);
             for e in through(medium.grid().expect("a grid"), &ray) {
                 assert_eq!((e.mean(), e.standard_error()), (truth, 0.0), "{layout:?} {offset}");
             }

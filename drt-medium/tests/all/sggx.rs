@@ -178,11 +178,17 @@ fn a_slab_lets_light_through_by_its_direction() {
         let truth = Rgb::new(0.7, 1.1, 0.0).map(|sigma| (-sigma * area * t).exp());
         for medium in [&plain, &voxels] {
             let rng = &mut Rng::new(1, 1, 1);
-            let through = medium.transmittance(Vec3::ZERO, dir, t, rng, stats);
+            let through = medium.transmittance(&Ray::new(Vec3::ZERO, dir).until(t), rng, stats);
             assert!((through - truth).max_abs() < 1e-9, "{through:?} {truth:?}");
             let passing = estimate(40_000, |rng, stats| {
                 let channels = Rgb::new(1.0, 1.0, 1.0);
-                match medium.sample_distance(Vec3::ZERO, dir, t, channels, 0.0, rng, stats) {
+                match medium.sample_distance(
+                    &Ray::new(Vec3::ZERO, dir).until(t),
+                    channels,
+                    0.0,
+                    rng,
+                    stats,
+                ) {
                     DistanceSample::Pass { weight } => weight.g,
                     DistanceSample::Scatter { .. } => 0.0,
                 }
@@ -201,7 +207,7 @@ fn middles(length: f64, parts: u32) -> Vec<(f64, f64)> {
 }
 
 fn through() -> Ray {
-    Ray::new(vec3(-0.9, 0.1, 0.15), vec3(2.0, 1.5, 0.9).normalize(), 1.6)
+    Ray::new(vec3(-0.9, 0.1, 0.15), vec3(2.0, 1.5, 0.9).normalize()).until(1.6)
 }
 
 #[test]
@@ -210,13 +216,10 @@ fn a_varying_cloud_lets_through_what_quadrature_says() {
     let points = middles(ray.t_max, 4000);
     let depth = DepthEstimate::inside(&medium, ray, &points, false).depth().r;
     let truth = (-depth).exp();
-    let through = estimate(40_000, |rng, stats| {
-        medium.transmittance(ray.origin, ray.dir, ray.t_max, rng, stats).r
-    });
+    let through = estimate(40_000, |rng, stats| medium.transmittance(&ray, rng, stats).r);
     assert_agrees("through the cloud", &through, truth, 0.01);
     let free = estimate(40_000, |rng, stats| {
-        let sample =
-            medium.sample_distance(ray.origin, ray.dir, ray.t_max, Rgb::ONE, 0.1, rng, stats);
+        let sample = medium.sample_distance(&ray, Rgb::ONE, 0.1, rng, stats);
         match sample {
             DistanceSample::Pass { weight } => weight.r,
             DistanceSample::Scatter { .. } => 0.0,

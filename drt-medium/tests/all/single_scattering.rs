@@ -2,7 +2,7 @@
 //! derivatives with respect to the medium, from detached free flights.
 
 use crate::common::*;
-use drt_math::{Rgb, Vec3, vec3};
+use drt_math::{Ray, Rgb, Vec3, vec3};
 use drt_medium::{
     DistanceSample, FlowPlace, Homogeneous, Medium, MediumChange, Phase, Property, TrackingStats,
     ValueChange,
@@ -24,7 +24,7 @@ fn radiance(change: Option<MediumChange>) -> drt_math::Moments {
     let dir = vec3(0.9759000729485331, 0.19518001458970663, 0.09759000729485331);
     estimate(SAMPLES, |rng, _| {
         let stats = &mut TrackingStats::default();
-        let s = medium.sample_distance(Vec3::ZERO, dir, f64::INFINITY, Rgb::ONE, 0.3, rng, stats);
+        let s = medium.sample_distance(&Ray::new(Vec3::ZERO, dir), Rgb::ONE, 0.3, rng, stats);
         let DistanceSample::Scatter { t, weight, .. } = s else { return 0.0 };
         let x = dir * t;
         let r = (LIGHT - x).length();

@@ -23,7 +23,7 @@ fn sample(
     rng: &mut Rng,
 ) -> DistanceSample {
     let stats = &mut TrackingStats::default();
-    medium.sample_distance(ray.origin, ray.dir, ray.t_max, channels, defensive, rng, stats)
+    medium.sample_distance(ray, channels, defensive, rng, stats)
 }
 
 /// Counts of plain gray free flights per cell of equal width, and of passes.
@@ -111,12 +111,12 @@ fn check_distances(what: &str, medium: &Medium, ray: &Ray, channels: Rgb, defens
 #[test]
 fn distances_in_chromatic_homogeneous_media() {
     let medium = homogeneous(CHROMATIC);
-    let ray = Ray::new(Vec3::ZERO, Vec3::X, 3.0);
+    let ray = Ray::new(Vec3::ZERO, Vec3::X).until(3.0);
     for channels in [Rgb::ONE, Rgb::new(1.0, 0.2, 3.0)] {
         check_distances("plain", &medium, &ray, channels, 0.0);
         check_distances("defensive", &medium, &ray, channels, 0.2);
     }
-    let infinite = Ray::new(Vec3::ZERO, Vec3::X, f64::INFINITY);
+    let infinite = Ray::new(Vec3::ZERO, Vec3::X);
     let opaque = homogeneous(Rgb::new(3.0, 5.0, 20.0));
     check_distances("infinite", &opaque, &infinite, Rgb::ONE, 0.0);
     check_distances("infinite, defensive", &opaque, &infinite, Rgb::ONE, 0.2);
@@ -126,7 +126,7 @@ fn distances_in_chromatic_homogeneous_media() {
 fn distances_in_chromatic_grids() {
     let constant = Grid::constant(CHROMATIC).expect("finite");
     let medium = grid_medium(constant, 1.0, Rgb::ONE);
-    let ray = Ray::new(vec3(-0.2, 0.4, 0.3), vec3(1.0, 0.2, 0.1).normalize(), f64::INFINITY);
+    let ray = Ray::new(vec3(-0.2, 0.4, 0.3), vec3(1.0, 0.2, 0.1).normalize());
     check_distances("constant grid", &medium, &ray, Rgb::ONE, 0.0);
     let cloud = cloud(Layout::VoxelCentred);
     let ray = ray_through(&cloud, vec3(0.8, 0.3, -0.2));
@@ -139,7 +139,7 @@ fn every_sample_has_the_density_it_says() {
     let medium = homogeneous(CHROMATIC);
     let (channels, defensive) = (Rgb::new(0.5, 1.0, 0.2), 0.3);
     for t_max in [2.5, f64::INFINITY] {
-        let ray = Ray::new(Vec3::ZERO, Vec3::Y, t_max);
+        let ray = Ray::new(Vec3::ZERO, Vec3::Y).until(t_max);
         let h = medium.homogeneous().expect("homogeneous");
         let mut total = h.pass_probability(t_max, channels, defensive);
         // t = x / (1 - x) for the infinite ray.
@@ -172,7 +172,7 @@ fn extreme_homogeneous_segments_stay_finite() {
             for other in [0.0, 1.0, sigma] {
                 for defensive in [0.0, 0.5] {
                     let medium = homogeneous(Rgb::new(sigma, other, 0.0));
-                    let ray = Ray::new(Vec3::ZERO, Vec3::Z, t_max);
+                    let ray = Ray::new(Vec3::ZERO, Vec3::Z).until(t_max);
                     for i in 0..20 {
                         let rng = &mut Rng::new(2, 0, i);
                         let s = sample(&medium, &ray, Rgb::new(1.0, 1.0, 0.0), defensive, rng);
@@ -192,7 +192,7 @@ fn extreme_homogeneous_segments_stay_finite() {
 #[test]
 fn channels_without_throughput_get_finite_weights() {
     let medium = homogeneous(Rgb::new(0.0, 5.0, 6.0));
-    let ray = Ray::new(Vec3::ZERO, Vec3::Z, f64::INFINITY);
+    let ray = Ray::new(Vec3::ZERO, Vec3::Z);
     let channels = Rgb::new(0.0, 1.0, 1.0);
     for t_max in [1e-3, 4.0, 1e3, f64::INFINITY] {
         for i in 0..200 {
@@ -211,7 +211,7 @@ fn ratio_tracking_is_the_transmittance_in_every_channel() {
         let truth = (-optical_depth(&medium, &ray)).exp().to_array();
         for (channel, truth) in truth.into_iter().enumerate() {
             let e = estimate(300_000, |rng, stats| {
-                let t = medium.transmittance(ray.origin, ray.dir, ray.t_max, rng, stats);
+                let t = medium.transmittance(&ray, rng, stats);
                 t.to_array()[channel]
             });
             assert_agrees("cloud transmittance", &e, truth, 0.003);
@@ -226,7 +226,7 @@ fn empty_voxels_need_defensive_sampling() {
     // of dF that comes from there has no vertex to sit on in plain free flight.
     let values = vec![2., 2., 2., 2., 0., 0., 0., 0.];
     let medium = grid_medium(Grid::new([8, 1, 1], 1, values).expect("valid"), 1.0, Rgb::ONE);
-    let ray = Ray::new(vec3(-0.5, 0.5, 0.5), Vec3::X, f64::INFINITY);
+    let ray = Ray::new(vec3(-0.5, 0.5, 0.5), Vec3::X);
     let truth = (-1.0_f64).exp();
     let derivative = |defensive: f64| {
         estimate(400_000, |rng, _| match sample(&medium, &ray, Rgb::ONE, defensive, rng) {
@@ -254,7 +254,7 @@ fn line_points_integrate_over_the_box() {
     let mut points = Vec::new();
     let e = estimate(200_000, |rng, _| {
         points.clear();
-        medium.line_points(ray.origin, ray.dir, ray.t_max, rng, &mut points);
+        medium.line_points(&ray, rng, &mut points);
         points.iter().map(|&(t, w)| medium.sigma_t(ray.at(t)).b * w).sum()
     });
     assert_agrees("line points", &e, truth, 0.005 * truth);
@@ -264,9 +264,9 @@ fn line_points_integrate_over_the_box() {
 fn homogeneous_media_and_constant_grids_agree() {
     let (sigma, albedo) = (Rgb::new(0.7, 1.1, 2.0), Rgb::splat(0.5));
     let grid = grid_medium(Grid::constant(sigma).expect("finite"), 1.0, albedo);
-    let ray = Ray::new(vec3(-0.5, 0.5, 0.5), Vec3::X, f64::INFINITY);
+    let ray = Ray::new(vec3(-0.5, 0.5, 0.5), Vec3::X);
     let stats = &mut TrackingStats::default();
-    let t = grid.transmittance(ray.origin, ray.dir, ray.t_max, &mut Rng::new(0, 0, 0), stats);
+    let t = grid.transmittance(&ray, &mut Rng::new(0, 0, 0), stats);
     assert!((t - (-sigma).exp()).max_abs() < 1e-14, "the control takes all: {t:?}");
     // The gap between the channels' majorant and minorant is zero: nothing is looked up.
     assert_eq!(stats.lookups, 0);
@@ -314,7 +314,7 @@ proptest! {
             2 => dir = vec3(dir.x, dir.y, 1e-17),
             _ => {}
         }
-        let ray = Ray::new(origin, dir.normalize(), 2.0);
+        let ray = Ray::new(origin, dir.normalize()).until(2.0);
         let grid = medium.grid().expect("a grid");
         let mut end = None;
         let mut covered = 0.0;

@@ -14,9 +14,7 @@ fn p07_value_by_quadrature_and_by_tracking() {
     let (medium, ray) = (p07(), p07_ray());
     let exact = P07_RADIANCE * (-optical_depth(&medium, &ray)).exp().r;
     assert!((exact / P07_VALUE - 1.0).abs() < 1e-12, "{exact}");
-    let e = estimate(SAMPLES, |rng, stats| {
-        P07_RADIANCE * medium.transmittance(ray.origin, ray.dir, ray.t_max, rng, stats).g
-    });
+    let e = estimate(SAMPLES, |rng, stats| P07_RADIANCE * medium.transmittance(&ray, rng, stats).g);
     assert_agrees("P07", &e, P07_VALUE, 0.003 * P07_VALUE);
     assert_rejects("P07 without scale", &e, P07_RADIANCE * (P07_VALUE / 2.0).powf(1.0 / 0.9));
 }
@@ -128,7 +126,7 @@ fn optical_depth_gradients_at_both_ends() {
     let ends = [through.at(0.7), through.at(2.6)];
     let segment = |[a, b]: [Vec3; 2]| {
         let r = (b - a).length();
-        Ray::new(a, (b - a) / r, r)
+        Ray::new(a, (b - a) / r).until(r)
     };
     let velocities = [vec3(0.3, -0.5, 0.8), vec3(0.2, 0.9, 0.1)];
     let mut points = Vec::new();
@@ -157,7 +155,7 @@ fn homogeneous_rates_are_exact() {
         .tangent(&MediumChange::Value { property: Property::SigmaT, op, voxels: None }, 0.0)
         .expect("a change");
     let (rng, stats) = (&mut Rng::new(0, 0, 0), &mut TrackingStats::default());
-    let ray = Ray::new(Vec3::ZERO, Vec3::X, 3.0);
+    let ray = Ray::new(Vec3::ZERO, Vec3::X).until(3.0);
     let e = medium.transmittance_rate(&ray, &tangent, rng, stats, &mut Vec::new());
     for (rate, sigma) in e.rate.to_array().into_iter().zip([0.0, 0.5, 2.0_f64]) {
         assert!((rate + 3.0 * (-3.0 * sigma).exp()).abs() < 1e-14);

@@ -3,7 +3,7 @@
 use drt_math::{Vec3, vec3};
 use drt_medium::Grid;
 use drt_medium::vol::{
-    VolError, VolFile, decode, encode, encode_matrices, read, read_matrices, write,
+    VolError, VolFile, decode, decode_matrices, encode, encode_matrices, read, read_matrices, write,
 };
 use proptest::prelude::*;
 
@@ -54,6 +54,7 @@ fn written_matrices_come_back() {
     let bytes = encode_matrices(&parts).expect("numbers that fit");
     // Six channels side by side.
     assert_eq!(bytes[20], 6);
+    assert_eq!(decode_matrices(&bytes, "s.vol").expect("what was written"), parts);
     std::fs::write(&path, bytes).expect("a writable folder");
     let again = read_matrices(&path);
     let alone = read(&path).expect_err("a file of matrices").to_string();

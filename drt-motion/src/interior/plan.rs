@@ -13,6 +13,7 @@ use super::{
 
 /// How the inside of a medium moves with each parameter.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct InteriorPlan {
     /// The parameters that move it, and how.
     pub velocities: Vec<(usize, InteriorVelocity)>,

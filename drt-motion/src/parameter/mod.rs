@@ -27,6 +27,38 @@ pub struct Parameter<T = String> {
     pub effects: Vec<Effect<T>>,
 }
 
+impl<T> Parameter<T> {
+    /// A parameter of value 0 that changes nothing yet.
+    ///
+    /// ```
+    /// use drt_motion::drt_math::{Rgb, ValueChange, Vec3};
+    /// use drt_motion::{GeometryChange, Parameter, PropertyChange};
+    ///
+    /// let lift: Parameter = Parameter::new("lift")
+    ///     .at(0.5)
+    ///     .effect("square", GeometryChange::Translate(Vec3::Z))
+    ///     .effect("lamp", PropertyChange::new("intensity", ValueChange::Add(Rgb::ONE)));
+    /// assert_eq!((lift.value, lift.effects.len()), (0.5, 2));
+    /// ```
+    #[must_use]
+    pub fn new(name: impl Into<String>) -> Self {
+        Self { name: name.into(), value: 0.0, effects: Vec::new() }
+    }
+
+    /// The parameter at another value of theta.
+    #[must_use]
+    pub fn at(self, value: f64) -> Self {
+        Self { value, ..self }
+    }
+
+    /// The parameter with a further effect, which is applied after those before it.
+    #[must_use]
+    pub fn effect(mut self, target: impl Into<T>, change: impl Into<Change<T>>) -> Self {
+        self.effects.push(Effect { target: target.into(), change: change.into() });
+        self
+    }
+}
+
 /// One thing that changes with a parameter.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -48,6 +80,18 @@ pub enum Change<T = String> {
     Property(PropertyChange),
     /// It follows whatever this same parameter does to the geometry of another target.
     Follow(T),
+}
+
+impl<T> From<GeometryChange> for Change<T> {
+    fn from(change: GeometryChange) -> Self {
+        Self::Geometry(change)
+    }
+}
+
+impl<T> From<PropertyChange> for Change<T> {
+    fn from(change: PropertyChange) -> Self {
+        Self::Property(change)
+    }
 }
 
 /// A change at a value of its parameter, ready to be applied.

@@ -21,6 +21,14 @@ pub struct PropertyChange {
     pub texels: Option<Texels>,
 }
 
+impl PropertyChange {
+    /// A change of a whole property.
+    #[must_use]
+    pub fn new(property: impl Into<String>, op: ValueChange) -> Self {
+        Self { property: property.into(), op, voxels: None, texels: None }
+    }
+}
+
 /// Texels of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

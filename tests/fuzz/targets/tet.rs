@@ -12,9 +12,9 @@ fuzz_target!(|bytes: &[u8]| {
     let mesh = match cut {
         Some(at) => {
             let (nodes, tets) = (&bytes[..at], &bytes[at + BETWEEN.len()..]);
-            drt_geom::read_tetgen([(nodes, "fuzz.node"), (tets, "fuzz.ele")])
+            drt_geom::decode_tetgen([(nodes, "fuzz.node"), (tets, "fuzz.ele")])
         }
-        None => drt_geom::read_medit(bytes, "fuzz.mesh"),
+        None => drt_geom::decode_medit(bytes, "fuzz.mesh"),
     };
     if let Ok(mesh) = mesh {
         use_tetrahedra(&mesh);

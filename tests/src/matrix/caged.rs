@@ -7,7 +7,7 @@ use std::sync::Arc;
 use drt_estimators::InteriorMotion;
 use drt_estimators::surface::Bsdf;
 use drt_geom::procedural::{bumpy_sphere, cube, icosphere};
-use drt_geom::{Mesh, load_obj, weld};
+use drt_geom::{Mesh, read_obj, weld};
 use drt_math::{Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
 
@@ -87,7 +87,7 @@ pub fn caged_solid() -> Result<Stage> {
 /// # Errors
 /// When the file cannot be read, or the library rejects it.
 pub fn scanned(path: &Path) -> Result<Stage> {
-    let read = load_obj(&std::fs::read(path)?, &path.display().to_string())?;
+    let read = read_obj(path)?;
     let bounds = read.bounds();
     let size = 1.4 / bounds.extent().max_abs();
     let scan = at(&closed(&read)?, Vec3::splat(size), -bounds.center() * size);

@@ -144,6 +144,12 @@ impl<'a> Descent<'a> {
         self.optimizer.values()
     }
 
+    /// The first loss and the last one, where there are some.
+    pub(super) fn losses(&self) -> Option<[f64; 2]> {
+        let history = locked(&self.history);
+        Some([*history.losses.first()?, *history.losses.last()?])
+    }
+
     /// The estimators that derivatives are by, each once.
     pub(super) fn estimators(&self) -> Vec<&'static str> {
         let mut names: Vec<_> = self.estimators.iter().map(|kind| kind.name()).collect();

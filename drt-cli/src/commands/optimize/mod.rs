@@ -153,6 +153,12 @@ fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluatio
     if problem.job.settings.estimator == EstimatorKind::Auto && !names.is_empty() {
         text += &format!("derivatives by {}, as a pilot chose\n", names.join(" and "));
     }
+    if let Some([first, last]) = descent.losses() {
+        text += &format!("loss {first:.3e} at the start, {last:.3e} at the end\n");
+    }
+    if let Some(folder) = &problem.plan.checkpoint {
+        text += &format!("results and report.html are in {}\n", folder.display());
+    }
     if descent.steps() < problem.iterations {
         let (steps, n) = (descent.steps(), problem.iterations);
         text += &match &problem.plan.checkpoint {

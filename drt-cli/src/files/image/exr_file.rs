@@ -41,6 +41,7 @@ pub type NamedLayer<'a> = (&'a str, &'a [[f32; 3]]);
 
 /// An EXR file as read: colours by layer name, the plain `R`, `G`, `B` under the empty name.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct ExrFile {
     /// Columns and rows.
     pub size: [u32; 2],
@@ -272,7 +273,8 @@ pub(super) fn read_plain(
     expected: impl Fn([u32; 2]) -> Result<(), CliError>,
 ) -> Result<Vec<[f32; 3]>, CliError> {
     let fail = |reason: &dyn std::fmt::Display| CliError::input(&Place::file(path), reason);
-    let headers = headers(path)?;
+    let bytes = input_file::read_at(path, None)?;
+    let headers = headers(&bytes, path)?;
     let mut names = Vec::new();
     for header in &headers {
         expected([header.layer_size.width() as u32, header.layer_size.height() as u32])?;
@@ -287,7 +289,7 @@ pub(super) fn read_plain(
         let message = format!("its channels are {names}; expected R, G and B, or Y for grey");
         return Err(fail(&message));
     }
-    let pixels = read_exr(path)?.layers.remove("");
+    let pixels = decode(&bytes, path)?.layers.remove("");
     pixels.ok_or_else(|| fail(&"it has no channels R, G and B"))
 }
 
@@ -297,21 +299,23 @@ fn is_gray(has: impl Fn(&&str) -> bool) -> bool {
 }
 
 /// The headers of a file, one for each part.
-fn headers(path: &Path) -> Result<SmallVec<[exr::meta::header::Header; 3]>, CliError> {
-    input_file::checked(path)?;
-    let meta = exr::meta::MetaData::read_from_file(path, false);
+fn headers(
+    bytes: &[u8],
+    path: &Path,
+) -> Result<SmallVec<[exr::meta::header::Header; 3]>, CliError> {
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false);
     Ok(meta.map_err(|e| CliError::input(&Place::file(path), e))?.headers)
 }
 
 /// Refuses a file whose pixels do not fit into memory.
-fn check_memory(path: &Path) -> Result<(), CliError> {
+fn check_memory(bytes: &[u8], path: &Path) -> Result<(), CliError> {
     let samples = |h: exr::meta::header::Header| {
         let pixels = h.layer_size.width() as u128 * h.layer_size.height() as u128;
         pixels * h.channels.list.len() as u128
     };
     // As read, and as colours.
-    let bytes = 8 * headers(path)?.into_iter().map(samples).sum::<u128>();
-    memory::check(bytes).map_err(|e| CliError::input(&Place::file(path), format!("its pixels {e}")))
+    let room = 8 * headers(bytes, path)?.into_iter().map(samples).sum::<u128>();
+    memory::check(room).map_err(|e| CliError::input(&Place::file(path), format!("its pixels {e}")))
 }
 
 /// Reads the colours of an EXR file of one or several parts. Where a layer has luminance alone, that is all of its colours.
@@ -319,8 +323,20 @@ fn check_memory(path: &Path) -> Result<(), CliError> {
 /// # Errors
 /// When it cannot be read, is malformed, has parts of several sizes or no colour channels.
 pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
+    decode(&input_file::read_at(path, None)?, path)
+}
+
+/// Reads the bytes of an EXR file as [`read_exr`] does; errors call it by the given name.
+///
+/// # Errors
+/// As [`read_exr`].
+pub fn decode_exr(bytes: &[u8], name: &str) -> Result<ExrFile, CliError> {
+    decode(bytes, Path::new(name))
+}
+
+fn decode(bytes: &[u8], path: &Path) -> Result<ExrFile, CliError> {
     let fail = |reason: &dyn std::fmt::Display| CliError::input(&Place::file(path), reason);
-    check_memory(path)?;
+    check_memory(bytes, path)?;
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -328,7 +344,7 @@ pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
         .all_layers()
         .all_attributes()
         .non_parallel()
-        .from_file(path)
+        .from_buffered(Cursor::new(bytes))
         .map_err(|e: Error| fail(&e))?;
     let mut file = ExrFile::default();
     for part in &image.layer_data {

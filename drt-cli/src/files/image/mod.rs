@@ -12,7 +12,8 @@ pub(crate) mod tone;
 pub(crate) use contact_sheet::{Canvas, show_layers};
 pub use contact_sheet::{is_error, write_layers, write_preview};
 pub use exr_file::{
-    ExrFile, NamedLayer, Provenance, attachment, encode_texels, is_result_of, read_exr, write_exr,
+    ExrFile, NamedLayer, Provenance, attachment, decode_exr, encode_texels, is_result_of, read_exr,
+    write_exr,
 };
 pub use picture::{Picture, read_picture};
 pub use tone::{Tone, ToneCurve};

@@ -1,4 +1,4 @@
-//! Plain pictures: linear colours from EXR, NPY or PNG, and PNG to look at.
+//! Plain pictures: linear colours from EXR, PFM, NPY or PNG, and PNG to look at.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Write};
@@ -12,12 +12,13 @@ use crate::CliError;
 use crate::error::Place;
 use crate::files::input_file;
 use crate::files::npy::{MAGIC, read_npy_image};
+use crate::files::pfm;
 
 /// A picture, row by row from the top left.
 pub struct Picture {
     /// Columns and rows.
     pub size: [u32; 2],
-    /// What is stored: linear colours in EXR, in PNG values from 0 to 1.
+    /// What is stored: values from 0 to 1 in PNG, and linear colours in the other formats.
     values: Vec<Rgb>,
     /// Values are encoded for screens.
     encoded: bool,
@@ -43,8 +44,8 @@ pub(crate) const SCREEN: &str = "for the eye alone: exposed for a screen";
 /// The keyword of that note.
 const NOTE: &str = "Comment";
 
-/// Reads a picture that must be of a film's size: EXR (its plain `R`, `G`, `B`, or `Y` in place of all three), NPY or PNG;
-/// its first bytes tell which of them it is. What says in its header that it is of another size is not read any further.
+/// Reads a picture that must be of a film's size: EXR (its plain `R`, `G`, `B`, or `Y` in place of all three), PFM,
+/// NPY or PNG; its first bytes tell which of them it is. What says in its header that it is of another size is not read any further.
 ///
 /// # Errors
 /// Names the file and what is wrong with it or its size.
@@ -61,7 +62,10 @@ pub fn read_picture(path: &Path, film: [u32; 2]) -> Result<Picture, CliError> {
         let values = values.into_iter().map(Rgb::from).collect();
         Picture { size, values, encoded: false }
     } else {
-        let pixels = read_plain(path, expected)?;
+        let pixels = match pfm::read(path).map_err(|e| CliError::input(&Place::file(path), e))? {
+            Some((size, pixels)) => expected(size).map(|()| pixels)?,
+            None => read_plain(path, expected)?,
+        };
         let values = pixels.into_iter().map(|p| p.map(f64::from).into()).collect();
         Picture { size: film, values, encoded: false }
     };

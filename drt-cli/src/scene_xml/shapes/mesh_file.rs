@@ -10,13 +10,13 @@ use crate::scene_xml::element::Element;
 
 /// Reads an OBJ file for the shape `e`.
 pub(super) fn obj(e: &Element, path: &Path) -> Result<Mesh, CliError> {
-    let read = drt_geom::load_obj_mended(&bytes(e, path)?, &path.to_string_lossy());
+    let read = drt_geom::decode_obj_mended(&bytes(e, path)?, &path.to_string_lossy());
     read.map(|read| mended(e, path, read)).map_err(|err| e.error(err))
 }
 
 /// Reads a PLY file for the shape `e`.
 pub(super) fn ply(e: &Element, path: &Path) -> Result<Mesh, CliError> {
-    let read = drt_geom::load_ply_mended(&bytes(e, path)?, &path.to_string_lossy());
+    let read = drt_geom::decode_ply_mended(&bytes(e, path)?, &path.to_string_lossy());
     read.map(|read| mended(e, path, read)).map_err(|err| e.error(err))
 }
 

@@ -151,7 +151,7 @@ fn orthographic_films_scale_with_to_world() {
     for (pixel, x, y) in [([0.0, 0.0], -2.0, 4.25), ([40.0, 30.0], 4.0, -0.25)] {
         let ray = sensor.ray(pixel);
         assert!((ray.origin - vec3(x, y, 2.5)).max_abs() < 1e-12, "{ray:?}");
-        assert!((ray.direction + Vec3::Z).max_abs() < 1e-12);
+        assert!((ray.dir + Vec3::Z).max_abs() < 1e-12);
     }
 }
 

@@ -1,7 +1,7 @@
 //! A point of a path's segment that stands for volume vertices where free flight puts none.
 
-use drt_math::{Rgb, Vec3};
-use drt_medium::{DepthEstimate, Ray};
+use drt_math::{Ray, Rgb, Vec3};
+use drt_medium::DepthEstimate;
 
 use crate::derivative::adjoint::segment::{Along, Stretch};
 use crate::derivative::adjoint::{Differentiator, by_coefficients, lit_by};
@@ -49,7 +49,7 @@ impl Differentiator<'_> {
             return;
         }
         let medium = self.world.medium(m);
-        let ray = Ray::new(vertex.x, dir, 0.0);
+        let ray = Ray::new(vertex.x, dir).until(0.0);
         let point = DepthEstimate::inside(medium, ray, &[(0.0, 1.0)], false).at_rest();
         sink.depth(m, &point, -control);
     }

@@ -8,7 +8,7 @@
 //!
 //! Where σ depends on the direction w, w_dot·∫ ∂σ/∂w ds comes on top, with w_dot = (ẏ - ẋ) / R across w between two points.
 
-use drt_math::{Rgb, RgbVec, Vec3};
+use drt_math::{Ray, Rgb, RgbVec, Vec3};
 use drt_medium::DepthEstimate;
 
 use crate::derivative::adjoint::Differentiator;
@@ -194,11 +194,10 @@ impl Differentiator<'_> {
     ) -> Rgb {
         let medium = self.world.medium(m);
         let changes = sink.active().media[m];
-        let (start, length) = (path.start + path.dir * i.start, i.end - i.start);
+        let ray = Ray::new(path.start + path.dir * i.start, path.dir).until(i.end - i.start);
         let mut points = core::mem::take(&mut self.points);
         points.clear();
-        medium.line_points(start, path.dir, length, &mut self.rng, &mut points);
-        let ray = drt_medium::Ray::new(start, path.dir, length);
+        medium.line_points(&ray, &mut self.rng, &mut points);
         let relative = moving || (changes && sink.active().grids[m]);
         let mut depth = DepthEstimate::inside(medium, ray, &points, relative);
         if relative {

@@ -29,12 +29,12 @@
 //! paper, Eq. 41) have 1/s² for h/r², and these velocities for those of a pinhole; against a constant environment, which has
 //! no place, image points stand still, and N·(u_B - E_dot - |B - E| f_dot) remains.
 
-use drt_math::{Affine, Mat3, Real, Vec3};
+use drt_math::{Affine, Mat3, Ray, Real, Vec3};
 
 use crate::model::filter::Filter;
 use crate::model::sensor::{
-    CameraRay, Lens, Pinhole, Projection, Response, Sensor, SensorError, SensorGradient, Window,
-    finite, motion,
+    Lens, Pinhole, Projection, Response, Sensor, SensorError, SensorGradient, Window, finite,
+    motion,
 };
 
 /// How much more one axis of a film may be stretched than the other, or sheared: what printed matrices are off by.
@@ -111,15 +111,11 @@ impl Sensor {
         (adjoint - position, camera)
     }
 
-    pub(super) fn parallel_ray(&self, pixel: [f64; 2]) -> CameraRay {
+    pub(super) fn parallel_ray(&self, pixel: [f64; 2]) -> Ray {
         let p = &self.pinhole;
         let [a, b] = p.plane(pixel);
         let Lens { near, far, .. } = self.lens;
-        CameraRay {
-            origin: p.position + p.right * a + p.up * b,
-            direction: p.forward,
-            range: [0.0, far - near],
-        }
+        Ray::new(p.position + p.right * a + p.up * b, p.forward).until(far - near)
     }
 
     pub(super) fn orthographic_to_world(&self) -> Affine {

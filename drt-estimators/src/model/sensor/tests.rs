@@ -6,7 +6,7 @@ mod orthographic;
 use alloc::vec::Vec;
 
 use drt_math::testing::z_score;
-use drt_math::{Affine, Dual, Mat3, Moments, Real, Rng, Vec3, vec3};
+use drt_math::{Affine, Dual, Mat3, Moments, Ray, Real, Rng, Vec3, vec3};
 
 use crate::model::filter::{Filter, FilterKind};
 use crate::model::sensor::{
@@ -54,20 +54,20 @@ fn projection_inverts_rays() {
         let sensor = random_sensor(&mut rng);
         let pixel = random_pixel(&sensor, &mut rng);
         let ray = sensor.ray(pixel);
-        assert!((ray.direction.length() - 1.0).abs() < 1e-14);
-        let [near, far] = ray.range;
+        assert!((ray.dir.length() - 1.0).abs() < 1e-14);
+        let [near, far] = [near(&sensor, &ray), ray.t_max];
         let t = near + (10.0 - near) * rng.next_f64();
-        let seen = sensor.project(ray.origin + ray.direction * t).unwrap();
+        let seen = sensor.project(ray.origin + ray.dir * t).unwrap();
         for k in 0..2 {
             assert!((seen.pixel[k] - pixel[k]).abs() < 1e-9, "{pixel:?} {seen:?}");
         }
         for (t, visible) in
             [(0.999, false), (1.001, true), (0.999 * far / near, true), (1.001 * far / near, false)]
         {
-            let x = ray.origin + ray.direction * (t * near);
+            let x = ray.origin + ray.dir * (t * near);
             assert_eq!(sensor.project(x).is_some(), visible);
         }
-        assert!(sensor.project(ray.origin - ray.direction).is_none());
+        assert!(sensor.project(ray.origin - ray.dir).is_none());
         assert!(sensor.project(ray.origin).is_none());
     }
 }
@@ -86,11 +86,17 @@ fn the_image_is_upright() {
     assert!((p.right.cross(p.up) + p.forward).max_abs() < 1e-15);
 }
 
+/// How far along its ray a perspective camera's near clip plane is.
+fn near(sensor: &Sensor, ray: &Ray) -> f64 {
+    let lens = sensor.lens();
+    ray.t_max * lens.near / lens.far
+}
+
 /// Quadrilateral of random points before the camera, with its area in pixels.
 fn random_quad(sensor: &Sensor, rng: &mut Rng) -> ([Vec3; 3], f64) {
     let mut corner = |_| {
         let ray = sensor.ray(random_pixel(sensor, rng));
-        ray.origin + ray.direction * (1.0 + 4.0 * rng.next_f64())
+        ray.origin + ray.dir * (1.0 + 4.0 * rng.next_f64())
     };
     let triangle = [0, 1, 2].map(&mut corner);
     let [a, b, c] = triangle.map(|x| sensor.project(x).unwrap().pixel);
@@ -159,7 +165,7 @@ fn projection_gradients_are_those_of_duals() {
     for _ in 0..300 {
         let sensor = random_sensor(&mut rng);
         let ray = sensor.ray(random_pixel(&sensor, &mut rng));
-        let x = ray.origin + ray.direction * (ray.range[0] * (1.5 + 500.0 * rng.next_f64()));
+        let x = ray.origin + ray.dir * (near(&sensor, &ray) * (1.5 + 500.0 * rng.next_f64()));
         let adjoints = random_vec(&mut rng);
         let p = sensor.project(x).unwrap();
         let (point, camera) =

@@ -5,11 +5,11 @@
 //! for an irradiance meter, whose one pixel has P = 1. An [orthographic](super::orthographic) camera
 //! sees one direction, and h stands for the delta in it.
 
-use drt_math::{Affine, Frame, Real, Vec3, warp};
+use drt_math::{Affine, Frame, Ray, Real, Vec3, warp};
 
 use crate::model::filter::{Filter, FilterKind, ON_BORDER};
 use crate::model::sensor::{
-    CameraRay, Lens, Projection, Response, Sensor, SensorError, SensorGradient, orthographic, unit,
+    Lens, Projection, Response, Sensor, SensorError, SensorGradient, orthographic, unit,
 };
 
 /// The largest radius of a filter, in pixels, whose samples are shared: each touches (2 × 8)² pixels.
@@ -67,7 +67,7 @@ impl Sensor {
                 let width = self.film[0];
                 let [x, y] = [pixel % width, pixel / width].map(|p| f64::from(p) + 0.5);
                 let point = [x + s.offset[0], y + s.offset[1]];
-                let CameraRay { origin, direction, .. } = self.ray(point);
+                let Ray { origin, dir: direction, .. } = self.ray(point);
                 ViewSample {
                     origin,
                     direction,
@@ -110,7 +110,7 @@ impl Sensor {
         let (x, of_x) = self.filter.sample_interval(pixel % w, w, u[0]);
         let (y, of_y) = self.filter.sample_interval(pixel / w, h, u[1]);
         let point = [x, y];
-        let CameraRay { origin, direction, .. } = self.ray(point);
+        let Ray { origin, dir: direction, .. } = self.ray(point);
         let weight = 1.0 / (of_x * of_y);
         ViewSample { origin, direction, point, weight, slope: [0.0; 2], lens: [0.0; 2] }
     }
@@ -263,7 +263,7 @@ mod tests {
             Sensor::from_to_world(&place, lens, [40, 30], Filter::new(FilterKind::BOX).unwrap())
                 .unwrap();
         let pixel = [7.3, 21.9];
-        let direction = camera.ray(pixel).direction;
+        let direction = camera.ray(pixel).dir;
         let adjoint = vec3(0.4, -1.3, 0.7);
         let gradient = camera.direction_gradient(direction, adjoint);
         let field = Affine {

@@ -77,6 +77,7 @@ pub enum ShardError {
 
 /// A run from its shards.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Merged {
     /// The images. Where shards are missing they are marked as not complete, but they are unbiased, with the errors of
     /// the samples that were taken.

@@ -14,11 +14,10 @@
 //! through the border, as they fall the other one does. Samples are taken on either side of the border as often, so that the
 //! estimate is the mean of both derivatives, as that of central differences is.
 
-use drt_math::{Rgb, Vec3};
+use drt_math::{Ray, Rgb, Vec3};
 
 use crate::derivative::sensitivity::VelocityTerm;
 use crate::model::filter::ON_BORDER;
-use crate::model::sensor::CameraRay;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments::{BoundarySink, Buffers};
@@ -59,7 +58,7 @@ pub(crate) fn sample<R: BoundarySink>(
     let chosen_by = if neighbour.is_some() { 2.0 } else { 1.0 };
     let inv_pdf = 2.0 * radius * sides / chosen_by;
 
-    let CameraRay { origin, direction: dir, .. } = camera.ray(q);
+    let Ray { origin, dir, .. } = camera.ray(q);
     let mut ray = core::mem::take(&mut b.ray);
     world.cast(&world.eye_at(origin), dir, &mut ray, &mut tracer.counters);
     let travel = tracer.travel(origin, dir, &ray, Rgb::ONE);

@@ -6,7 +6,7 @@ mod tests;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_math::{Real, Rgb, Rng, Vec3};
+use drt_math::{Ray, Real, Rgb, Rng, Vec3};
 
 use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
 use crate::derivative::velocity::Spatial;
@@ -193,7 +193,7 @@ impl Reservoir {
         }
         for i in intervals(ray.medium, &ray.crossings, ray.length) {
             let Some(m) = i.medium.filter(|m| flux.sweeps_grid(*m, moves)) else { continue };
-            let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
+            let part = Ray::new(origin + dir * i.start, dir).until(i.end - i.start);
             world.medium(m).crossings(&part, |c| {
                 let cosine = Real::abs(c.normal.dot(dir));
                 let x = part.at(c.t);

@@ -71,8 +71,8 @@
 
 use core::ops::ControlFlow;
 
-use drt_math::{Rgb, Rng, Vec3, fm};
-use drt_medium::{Piece, Ray};
+use drt_math::{Ray, Rgb, Rng, Vec3, fm};
+use drt_medium::Piece;
 
 use crate::sampling::trace::{Arrival, Endpoint, OutgoingRay, Tracer};
 use crate::world::lights::Environment;
@@ -162,7 +162,7 @@ impl Probes {
         for i in intervals(ray.medium, &ray.crossings, ray.length) {
             let Some(m) = i.medium.filter(|_| i.end > i.start) else { continue };
             let floor = world.probed[m];
-            let part = Ray::new(origin + dir * i.start, dir, i.end - i.start);
+            let part = Ray::new(origin + dir * i.start, dir).until(i.end - i.start);
             world.medium(m).means(&part, &mut |piece: &Piece| {
                 let length = piece.end - piece.start;
                 let rates = [piece.mean, piece.minorant].map(least);

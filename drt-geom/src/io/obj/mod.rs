@@ -8,6 +8,7 @@
 
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
+use std::path::Path;
 
 use self::table::Table;
 use super::polygons::{AssembleError, Corner, Polygons};
@@ -19,8 +20,9 @@ mod table;
 /// What is wrong with an OBJ file, and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}: {kind}")]
+#[non_exhaustive]
 pub struct ObjError {
-    /// The name given to [`load_obj`].
+    /// The file's path, or the name given with its bytes.
     pub file: String,
     /// Line, from 1; the last one where the file as a whole is at fault.
     pub line: usize,
@@ -62,9 +64,24 @@ pub enum ObjErrorKind {
     /// Not one face in the file.
     #[error("the file has no faces")]
     NoFaces,
+    /// The file cannot be read at all.
+    #[error("cannot be read: {0}")]
+    Unreadable(String),
     /// Anything else that `tobj` has to say.
     #[error("{0}")]
-    Unreadable(tobj::LoadError),
+    Other(tobj::LoadError),
+}
+
+/// Reads a Wavefront OBJ file as [`decode_obj`] does.
+///
+/// # Errors
+/// When the file cannot be read, or as that.
+pub fn read_obj(path: impl AsRef<Path>) -> Result<Mesh, ObjError> {
+    let (file, bytes) = super::named(path.as_ref());
+    match bytes {
+        Ok(bytes) => decode_obj(&bytes, &file),
+        Err(reason) => Err(ObjError { file, line: 1, kind: ObjErrorKind::Unreadable(reason) }),
+    }
 }
 
 /// Reads a Wavefront OBJ file, given as its bytes and the name that errors should call it by.
@@ -78,16 +95,16 @@ pub enum ObjErrorKind {
 ///
 /// # Errors
 /// For a line that does not say what it should, and for a file without faces.
-pub fn load_obj(bytes: &[u8], name: &str) -> Result<Mesh, ObjError> {
+pub fn decode_obj(bytes: &[u8], name: &str) -> Result<Mesh, ObjError> {
     read(bytes, name, Polygons::default()).map(|(mesh, _)| mesh)
 }
 
-/// As [`load_obj`], with polygons whose edges cross (warped quads, say) cut into the fans from their first corners, and the
+/// As [`decode_obj`], with polygons whose edges cross (warped quads, say) cut into the fans from their first corners, and the
 /// number of these.
 ///
 /// # Errors
-/// As [`load_obj`], but for polygons whose edges cross.
-pub fn load_obj_mended(bytes: &[u8], name: &str) -> Result<(Mesh, usize), ObjError> {
+/// As [`decode_obj`], but for polygons whose edges cross.
+pub fn decode_obj_mended(bytes: &[u8], name: &str) -> Result<(Mesh, usize), ObjError> {
     read(bytes, name, Polygons::mending())
 }
 

@@ -101,9 +101,9 @@ impl Table {
             }
             // Told when all is read, and not of which face.
             LoadError::FaceVertexOutOfBounds => {
-                self.missing_item().unwrap_or((line, ObjErrorKind::Unreadable(error)))
+                self.missing_item().unwrap_or((line, ObjErrorKind::Other(error)))
             }
-            _ => (line, ObjErrorKind::Unreadable(error)),
+            _ => (line, ObjErrorKind::Other(error)),
         }
     }
 

@@ -1,5 +1,6 @@
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
+use std::path::Path;
 
 use drt_math::Vec3;
 
@@ -18,10 +19,11 @@ mod property;
 /// What is wrong with a PLY file, and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}: {place}: {kind}")]
+#[non_exhaustive]
 pub struct PlyError {
-    /// The name given to the reader.
+    /// The file's path, or the name given with its bytes.
     pub file: String,
-    /// The header line, or the element and its number.
+    /// The header line, or the element and its number, or `the file` where that cannot be read at all.
     pub place: String,
     /// What is wrong there.
     pub kind: PlyErrorKind,
@@ -31,6 +33,9 @@ pub struct PlyError {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlyErrorKind {
+    /// The file cannot be read at all.
+    #[error("cannot be read: {0}")]
+    Unreadable(String),
     /// A header line that cannot be understood.
     #[error("`{found}`: expected {expected}")]
     Header {
@@ -73,6 +78,20 @@ pub enum PlyErrorKind {
 /// Where and what, before the file's name is added.
 type Failure = (String, PlyErrorKind);
 
+/// Reads a PLY file as [`decode_ply`] does.
+///
+/// # Errors
+/// When the file cannot be read, or as that.
+pub fn read_ply(path: impl AsRef<Path>) -> Result<Mesh, PlyError> {
+    let (file, bytes) = super::named(path.as_ref());
+    match bytes {
+        Ok(bytes) => decode_ply(&bytes, &file),
+        Err(reason) => {
+            Err(PlyError { file, place: "the file".into(), kind: PlyErrorKind::Unreadable(reason) })
+        }
+    }
+}
+
 /// Reads a PLY file (ASCII, or binary of either byte order), given as its bytes and the name that errors
 /// should call it by.
 ///
@@ -85,17 +104,17 @@ type Failure = (String, PlyErrorKind);
 /// # Errors
 /// For the first thing that is not as the header says, and for a file without faces. Memory grows
 /// with the file, whatever counts the header claims.
-pub fn load_ply(bytes: &[u8], name: &str) -> Result<Mesh, PlyError> {
+pub fn decode_ply(bytes: &[u8], name: &str) -> Result<Mesh, PlyError> {
     let read = read_mesh(bytes, Polygons::default()).map(|(mesh, _)| mesh);
     read.map_err(|(place, kind)| PlyError { file: name.to_string(), place, kind })
 }
 
-/// As [`load_ply`], with polygons whose edges cross (warped quads, say) cut into the fans from their first corners, and the
+/// As [`decode_ply`], with polygons whose edges cross (warped quads, say) cut into the fans from their first corners, and the
 /// number of these.
 ///
 /// # Errors
-/// As [`load_ply`], but for polygons whose edges cross.
-pub fn load_ply_mended(bytes: &[u8], name: &str) -> Result<(Mesh, usize), PlyError> {
+/// As [`decode_ply`], but for polygons whose edges cross.
+pub fn decode_ply_mended(bytes: &[u8], name: &str) -> Result<(Mesh, usize), PlyError> {
     read_mesh(bytes, Polygons::mending()).map_err(|(place, kind)| PlyError {
         file: name.to_string(),
         place,
@@ -107,8 +126,8 @@ pub fn load_ply_mended(bytes: &[u8], name: &str) -> Result<(Mesh, usize), PlyErr
 /// velocity per vertex, say. Other elements may be there or not.
 ///
 /// # Errors
-/// As [`load_ply`].
-pub fn read_vertex_vectors(bytes: &[u8], name: &str) -> Result<Vec<Vec3>, PlyError> {
+/// As [`decode_ply`].
+pub fn decode_vertex_vectors(bytes: &[u8], name: &str) -> Result<Vec<Vec3>, PlyError> {
     read_vectors(bytes).map_err(|(place, kind)| PlyError { file: name.to_string(), place, kind })
 }
 

@@ -14,7 +14,7 @@ use crate::TetMesh;
 ///
 /// # Errors
 /// For the first line that does not say what it should, and for a file without the sections.
-pub fn read_medit(bytes: &[u8], name: &str) -> Result<TetMesh, TetFileError> {
+pub fn decode_medit(bytes: &[u8], name: &str) -> Result<TetMesh, TetFileError> {
     let mut words = Words::new(bytes, name);
     let mut mesh = read_sections(&mut words).map_err(|kind| words.fail(kind))?;
     mesh.orient();

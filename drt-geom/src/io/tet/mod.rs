@@ -8,14 +8,15 @@ mod medit;
 mod tetgen;
 mod words;
 
-pub use medit::read_medit;
-pub use tetgen::read_tetgen;
+pub use medit::decode_medit;
+pub use tetgen::decode_tetgen;
 
 /// What is wrong with a file of tetrahedra, and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}:{line}: {kind}")]
+#[non_exhaustive]
 pub struct TetFileError {
-    /// The name given to the reader.
+    /// The file's path, or the name given with its bytes.
     pub file: String,
     /// Line, from 1; the last one where the file as a whole is at fault.
     pub line: usize,
@@ -76,18 +77,19 @@ pub enum TetFileErrorKind {
     Repeated(&'static str),
 }
 
-/// Reads a tetrahedral mesh from a file by its extension: `.mesh` by [`read_medit`]; `.node` or
-/// `.ele`, and the other next to it, by [`read_tetgen`].
+/// Reads a tetrahedral mesh from a file by its extension: `.mesh` by [`decode_medit`]; `.node` or
+/// `.ele`, and the other next to it, by [`decode_tetgen`].
 ///
 /// # Errors
 /// When a file cannot be read, or as these.
-pub fn load_tet_mesh(path: &Path) -> Result<TetMesh, TetFileError> {
+pub fn read_tet_mesh(path: impl AsRef<Path>) -> Result<TetMesh, TetFileError> {
+    let path = path.as_ref();
     let read = |path: &Path| {
-        let name = path.display().to_string();
-        match std::fs::read(path) {
+        let (name, bytes) = super::named(path);
+        match bytes {
             Ok(bytes) => Ok((bytes, name)),
-            Err(e) => {
-                let kind = TetFileErrorKind::Unreadable(e.to_string());
+            Err(reason) => {
+                let kind = TetFileErrorKind::Unreadable(reason);
                 Err(TetFileError { file: name, line: 1, kind })
             }
         }
@@ -96,12 +98,12 @@ pub fn load_tet_mesh(path: &Path) -> Result<TetMesh, TetFileError> {
     match extension.to_str() {
         Some("mesh") => {
             let (bytes, name) = read(path)?;
-            read_medit(&bytes, &name)
+            decode_medit(&bytes, &name)
         }
         Some("node" | "ele") => {
             let (nodes, node_name) = read(&path.with_extension("node"))?;
             let (tets, tet_name) = read(&path.with_extension("ele"))?;
-            read_tetgen([(&nodes, &node_name), (&tets, &tet_name)])
+            decode_tetgen([(&nodes, &node_name), (&tets, &tet_name)])
         }
         _ => {
             let file = path.display().to_string();

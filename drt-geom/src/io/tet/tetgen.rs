@@ -15,7 +15,7 @@ use crate::TetMesh;
 ///
 /// # Errors
 /// For the first line that does not say what it should.
-pub fn read_tetgen(
+pub fn decode_tetgen(
     [(nodes, node_file), (tets, tet_file)]: [(&[u8], &str); 2],
 ) -> Result<TetMesh, TetFileError> {
     let mut words = Words::new(nodes, node_file);

@@ -91,7 +91,7 @@ pub(crate) fn p07() -> Medium {
 
 pub(crate) fn p07_ray() -> Ray {
     let dir = vec3(0.9634555216934667, 0.2119602147725627, 0.16378743868788936);
-    Ray::new(vec3(-1.0, 0.4, 0.1), dir, f64::INFINITY)
+    Ray::new(vec3(-1.0, 0.4, 0.1), dir)
 }
 
 /// Distances at which a ray crosses a plane between lattice points of the density grid, within the
@@ -159,5 +159,5 @@ pub(crate) fn ray_through(medium: &Medium, dir: Vec3) -> Ray {
     let grid = medium.grid().expect("a grid");
     let middle = grid.density().to_world().point(Vec3::splat(0.5));
     let dir = dir.normalize();
-    Ray::new(middle - dir * 2.5, dir, f64::INFINITY)
+    Ray::new(middle - dir * 2.5, dir)
 }

@@ -21,8 +21,8 @@ fn rays_of_an_image_point_meet_where_it_is_sharp() {
     let pixel = [7.3, 21.9];
     let through = |camera: &Sensor| {
         let ray = camera.ray(pixel);
-        let depth = 2.5 / ray.direction.dot(camera.pinhole().forward);
-        ray.origin + ray.direction * depth
+        let depth = 2.5 / ray.dir.dot(camera.pinhole().forward);
+        ray.origin + ray.dir * depth
     };
     for at in [[0.0, 0.0], [1.0, 0.0], [-0.3, 0.8]] {
         let one = lens.at_lens(at);
@@ -80,13 +80,13 @@ fn parts_of_films_keep_their_pixels() {
         for (camera, by) in [(&part, [10.0, 4.0]), (&again, [12.0, 5.0])] {
             let (a, b) = (whole.ray([14.3 + by[0], 2.5 + by[1]]), camera.ray([14.3, 2.5]));
             assert!((a.origin - b.origin).max_abs() < 1e-12);
-            assert!((a.direction - b.direction).max_abs() < 1e-12);
+            assert!((a.dir - b.dir).max_abs() < 1e-12);
         }
         // With half as many pixels it shows the same.
         let half = part.with_film([4, 6]).unwrap();
         let (a, b) = (part.ray([3.0, 5.0]), half.ray([1.5, 2.5]));
         assert!((a.origin - b.origin).max_abs() < 1e-12);
-        assert!((a.direction - b.direction).max_abs() < 1e-12);
+        assert!((a.dir - b.dir).max_abs() < 1e-12);
         assert!(whole.cropped([33, 0], [8, 1]).is_err());
         assert!(whole.cropped([0, 0], [0, 1]).is_err());
     }

@@ -58,7 +58,7 @@ fn a_common_rigid_motion_has_no_rate() {
         let turn = Affine::about(Mat3::skew(random_vec(&mut rng)), random_vec(&mut rng));
         let field = Affine { linear: turn.linear, translation: random_vec(&mut rng) };
         let ray = sensor.ray(random_pixel(&sensor, &mut rng));
-        let x = ray.origin + ray.direction * 3.0;
+        let x = ray.origin + ray.dir * 3.0;
         let p = sensor.project(x).unwrap();
         let tangent = sensor.velocity(&field);
         for (pixel, importance) in [([1.0, 0.0], 0.0), ([0.0, 1.0], 0.0), ([0.0, 0.0], 1.0)] {

@@ -35,7 +35,7 @@ fn rays_are_those_of_mitsuba() {
             Sensor::orthographic(&Affine { linear, ..view }, lens(), [8, 6], filter()).unwrap();
         let ray = sensor.ray([1.25, 2.0]);
         assert!((ray.origin - Vec3::from(origin)).max_abs() < 1e-5, "{ray:?}");
-        assert!((ray.direction - vec3(0.557086, -0.371391, -0.742781)).max_abs() < 1e-6);
+        assert!((ray.dir - vec3(0.557086, -0.371391, -0.742781)).max_abs() < 1e-6);
     }
 }
 
@@ -46,16 +46,16 @@ fn projection_inverts_rays() {
         let sensor = random_camera(&mut rng);
         let pixel = random_pixel(&sensor, &mut rng);
         let ray = sensor.ray(pixel);
-        let t = ray.range[1] * rng.next_f64();
-        let x = ray.origin + ray.direction * t;
+        let t = ray.t_max * rng.next_f64();
+        let x = ray.origin + ray.dir * t;
         let seen = sensor.project(x).unwrap();
         for (seen, pixel) in seen.pixel.iter().zip(pixel) {
             assert!((seen - pixel).abs() < 1e-9 * (1.0 + pixel));
         }
         assert!((seen.depth - t).abs() < 1e-12 * (1.0 + t));
         assert!((sensor.eye_of(x) - ray.origin).max_abs() < 1e-12);
-        assert!(sensor.project(ray.origin - ray.direction * 1e-3).is_none());
-        assert!(sensor.project(ray.origin + ray.direction * (1.001 * ray.range[1])).is_none());
+        assert!(sensor.project(ray.origin - ray.dir * 1e-3).is_none());
+        assert!(sensor.project(ray.origin + ray.dir * (1.001 * ray.t_max)).is_none());
         let again = sensor.with_film(sensor.film()).unwrap();
         assert!((again.ray(pixel).origin - ray.origin).max_abs() < 1e-12);
     }
@@ -94,7 +94,7 @@ fn gradients_are_those_of_duals() {
         let camera = sensor.pinhole();
         let pixel = random_pixel(&sensor, &mut rng);
         let ray = sensor.ray(pixel);
-        let x = ray.origin + ray.direction * (1.0 + 5.0 * rng.next_f64());
+        let x = ray.origin + ray.dir * (1.0 + 5.0 * rng.next_f64());
         let (adjoints, film) = (random_vec(&mut rng), random_vec(&mut rng));
         let dual = dual_pinhole(camera);
         let close = |point: Vec3, gradient: &SensorGradient, sum: D| {

@@ -45,6 +45,7 @@ pub struct MeasuredTables {
 /// What is wrong with an array of a measured material.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("`{field}` {reason}")]
+#[non_exhaustive]
 pub struct MeasuredError {
     /// The array.
     pub field: &'static str,

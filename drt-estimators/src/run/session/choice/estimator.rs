@@ -80,8 +80,12 @@ pub(crate) fn estimator(ground: &Ground<'_>, kept: &mut PreparedCache) -> Result
                 |(c, w): (&Candidate, &Work)| format!("{} {:.2}", named(c.kind).name(), w.ratio);
             let compared: Vec<String> = several.iter().zip(&works).map(ratio).collect();
             let compared = compared.join(", ");
-            let why = format!("in a pilot the work was, over the least of all, {compared}");
-            (best(several, &works), why)
+            let best = best(several, &works);
+            let kept = match several[best].kind == USUAL && works[best].ratio > 1.0 {
+                true => "; it is the usual one, and no other is sure to need much less",
+                false => "",
+            };
+            (best, format!("in a pilot the work was, over the least of all, {compared}{kept}"))
         }
     };
     let Candidate { kind, prepared: preparation, .. } = candidates.swap_remove(best);

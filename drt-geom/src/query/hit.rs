@@ -2,42 +2,6 @@ use drt_math::Vec3;
 
 use crate::NONE;
 
-/// A ray or segment: the points `origin + t dir` for `t` in (0, `t_max`).
-///
-/// `dir` may have any length but zero, and `t` is measured in units of it: with `dir = y - x` and
-/// `t_max = 1` the ray is the open segment from x to y. A ray with a NaN, or with a zero or infinite
-/// direction, meets nothing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Ray {
-    /// Where it starts.
-    pub origin: Vec3,
-    /// Where it goes.
-    pub dir: Vec3,
-    /// Where it ends, in units of `dir`; infinite for a ray without end.
-    pub t_max: f64,
-}
-
-impl Ray {
-    /// The ray without end.
-    #[must_use]
-    pub fn new(origin: impl Into<Vec3>, dir: impl Into<Vec3>) -> Self {
-        Self { origin: origin.into(), dir: dir.into(), t_max: f64::INFINITY }
-    }
-    /// The open segment between two points.
-    #[must_use]
-    pub fn segment(from: impl Into<Vec3>, to: impl Into<Vec3>) -> Self {
-        let (from, to) = (from.into(), to.into());
-        Self { origin: from, dir: to - from, t_max: 1.0 }
-    }
-    /// The point at parameter `t`.
-    #[inline]
-    #[must_use]
-    pub fn at(&self, t: f64) -> Vec3 {
-        self.origin + self.dir * t
-    }
-}
-
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
