@@ -49,7 +49,7 @@ pub(crate) fn estimator(ground: &Ground<'_>, kept: &mut PreparedCache) -> Result
     if asked.estimator != EstimatorKind::Auto || ground.tangents.names.is_empty() {
         return named_one(asked.estimator, None, kept);
     }
-    if let Some(why) = warped_alone(&ground.scene).filter(|_| ground.moves()) {
+    if let Some(why) = warped_alone(ground.scene).filter(|_| ground.moves()) {
         return named_one(EstimatorKind::Warped, Some(why), kept);
     }
     if let Some(why) = needs_no_pilot(ground) {
