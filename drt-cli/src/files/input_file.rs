@@ -38,6 +38,7 @@ pub(crate) fn check(path: &Path) -> io::Result<()> {
 }
 
 /// Refuses what is no regular file, with an error about the file.
+#[cfg(feature = "command")]
 pub(crate) fn checked(path: &Path) -> Result<(), CliError> {
     check(path).map_err(|e| unreadable(path, None, &e))
 }
