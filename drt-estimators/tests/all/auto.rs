@@ -57,7 +57,7 @@ fn what_is_chosen_is_the_named_estimator() {
     // `path-space` stays where little more than noise tells it from another one, and no other is chosen without the least work.
     let work_of = |name: &str| -> f64 {
         let (_, after) = works.split_once(&format!("{name} ")).unwrap();
-        after.split(',').next().unwrap().parse().unwrap()
+        after.split([',', ';']).next().unwrap().parse().unwrap()
     };
     let most = if name == "path-space" { 2.0 } else { 1.0 };
     assert!(work_of(name) <= most && work_of("warped") > 10.0, "{why}");

@@ -166,7 +166,7 @@ fn what_is_not_derived_is_refused() {
     for warp in [Warp::Points, Warp::Directions] {
         let warp = warp(AuxiliarySamples::default());
         let settings = Settings { estimator: Warped, warp, ..Settings::default() };
-        all(&refusal(&hidden, &settings), &["warp", "hide_emitters"]);
+        all(&refusal(&hidden, &settings), &["bulb", "hide_emitters"]);
     }
 }
 

@@ -126,10 +126,11 @@ pub enum ElementError {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
-    /// Light of points and directions in a scene with media, where something moves and the camera does not see other emitters.
+    /// Light of points and directions that the warped estimator leaves to another one, as in media, where something moves and the camera does
+    /// not see other emitters.
     #[error(
-        "its light goes through media, `hide_emitters` hides others, and `{parameter}` moves something; only finite differences \
-         have this derivative"
+        "its light is left to an estimator that does not know what `hide_emitters` hides, and `{parameter}` moves something; \
+         only finite differences have this derivative"
     )]
     HiddenEmitters {
         /// The parameter, or what else was to be differentiated by.
