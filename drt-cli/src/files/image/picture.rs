@@ -45,7 +45,7 @@ pub(crate) const SCREEN: &str = "for the eye alone: exposed for a screen";
 const NOTE: &str = "Comment";
 
 /// Reads a picture that must be of a film's size: EXR (its plain `R`, `G`, `B`, or `Y` in place of all three), PFM,
-/// NPY or PNG; its first bytes tell which of them it is. What says in its header that it is of another size is not read any further.
+/// NPY or PNG; its first bytes tell which of them it is. What says in its header that it is of another size is not decoded.
 ///
 /// # Errors
 /// Names the file and what is wrong with it or its size.
