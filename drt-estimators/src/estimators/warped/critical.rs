@@ -67,3 +67,28 @@ impl CriticalAngle {
         Some(Self { inverses, weight: (ByU::from(1.0) - near / square).squared() * MOST })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use drt_math::Vec3;
+
+    use super::*;
+
+    /// A ray that turns at V keeps h, and the weight is largest on the curve.
+    #[test]
+    fn turned_rays_keep_their_angle_of_refraction() {
+        let still = Vec3::zero();
+        let rate = |beyond: f64| RayVelocity { x: still, w: still, beyond: beyond.into() };
+        let at =
+            |h: f64| RayByU { x: still, w: still, beyond: h.into(), by_u: [rate(0.3), rate(-0.4)] };
+        let on_curve = CriticalAngle::beside(&at(0.0), None, 0.01).unwrap();
+        assert!((on_curve.weight.re - MOST).abs() < 1e-12);
+        let near = CriticalAngle::beside(&at(0.02), None, 0.01).unwrap();
+        assert!(near.weight.re > 0.0 && near.weight.re < MOST);
+        let (change, [evened, own]) = (0.7, near.inverses);
+        let turn = own.map(|v| -change * v.re);
+        assert!((change + 0.3 * turn[0] - 0.4 * turn[1]).abs() < 1e-12);
+        assert!(evened.iter().all(|v| v.re == 0.0));
+        assert!(CriticalAngle::beside(&at(0.06), None, 0.01).is_none());
+    }
+}
