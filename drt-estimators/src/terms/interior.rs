@@ -23,9 +23,7 @@ use crate::sampling::film::{Splat, SplatDensity};
 use crate::sampling::pixels::Sampler;
 use crate::sampling::record::PathRecord;
 use crate::sampling::record::Radiance;
-use crate::sampling::streams::{
-    DIMENSIONS, FLUX_STREAM, PAIR_STREAM, PROBE_STREAM, VELOCITY_STREAM,
-};
+use crate::sampling::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM, VELOCITY_STREAM};
 use crate::sampling::trace::Tracer;
 use crate::terms::edge_queries::EdgeQuery;
 use crate::world::{RayPath, World};
@@ -238,7 +236,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             view.begin(pairs, velocities, || stream(FLUX_STREAM));
         }
         if let Some(probes) = &mut self.probes {
-            probes.begin(Rng::new(self.seed, PROBE_STREAM | u64::from(pixel), unit));
+            probes.begin(self.seed, pixel, unit);
         }
         let shadows = self.workers.iter().any(|w| w.terms.boundary.shadows.is_some());
         let mut recorder = Recorder {

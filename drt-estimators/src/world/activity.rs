@@ -20,7 +20,11 @@ const STEADY_SURVIVAL: f64 = 0.9;
 const DEFENSIVE: f64 = 0.1;
 
 /// Optical depth of a medium's grid, along its diagonal, below which probes are better than vertices.
-const PROBED_DEPTH: f64 = 1.0;
+const PROBED_DEPTH: f64 = 3.0;
+/// How much an empty place counts for probes, against the densest, where only what is in proportion to the extinction changes.
+const LEAST_COUNT: f64 = 0.1;
+/// Optical depth of a medium's grid, along its diagonal, below which voxels are as good as empty.
+const EMPTY_DEPTH: f64 = 1.0;
 /// Share of voxels that are empty, or nearly so, from which on probes pay.
 const LEAST_EMPTY: f64 = 0.05;
 /// Part of a medium's largest extinction below which a voxel is thin, and the share of these from which on probes pay.
@@ -84,8 +88,7 @@ impl World {
             }
             let probed = self.probed_below(m);
             if changes || probed.is_some() {
-                self.probed[m] = probed.filter(|_| needs.extinctions[m]);
-                // The same where probes would be taken but nothing asks for them, so that all derivatives are by the same paths.
+                self.probed[m] = probed;
                 self.defensive[m] = match self.medium(m).even_extinction() {
                     Some(h) => self.defensive_where_thin(m, h),
                     None if probed.is_some() => 0.0,
@@ -105,10 +108,10 @@ impl World {
         if self.tracking[m] == Tracking::Attenuation || emitters.any(|x| medium.contains(x)) {
             return None;
         }
-        let floor = PROBED_DEPTH * grid.majorant_floor();
-        let varies = grid.share_below(floor) >= LEAST_EMPTY
+        let unit = grid.majorant_floor();
+        let varies = grid.share_below(EMPTY_DEPTH * unit) >= LEAST_EMPTY
             || grid.share_below(CONTRAST * grid.largest_sigma_t()) >= LEAST_THIN;
-        varies.then_some(floor)
+        varies.then_some(PROBED_DEPTH * unit)
     }
 
     /// The part of the derivative by the extinction at a vertex that is estimated by vertices there, in media with probes:
@@ -121,6 +124,18 @@ impl World {
             }
             None => 1.0,
         }
+    }
+
+    /// How much a point of a ray counts among those that a probe may be at, in medium `m` where the extinction is `sigma_t`. Where
+    /// extinctions stay as they are, nothing is owed where there is none.
+    pub(crate) fn weight_of_probes(&self, m: usize, sigma_t: f64) -> f64 {
+        let Some(floor) = self.probed[m] else { return 0.0 };
+        let counts = if self.needs.extinctions[m] {
+            0.5 * sigma_t + floor
+        } else {
+            sigma_t + LEAST_COUNT * floor
+        };
+        counts / (sigma_t + floor)
     }
 
     /// True where some medium is differentiated by probes.

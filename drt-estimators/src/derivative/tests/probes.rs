@@ -35,7 +35,7 @@ fn error(fault: Fault) -> f64 {
     let mut probes = Probes::new();
     let mut worst = 0.0;
     for i in 0..200 {
-        probes.begin(Rng::new(8, u64::from(i), 0));
+        probes.begin(8, i, 0);
         let slope = trace_with(&mut tracer, &mut recording, Some(&mut probes), None, 15, i);
         let record = &mut recording.record;
         let length = record.nodes[1].arrival.map_or(0.0, |a| {

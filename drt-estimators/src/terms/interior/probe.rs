@@ -47,6 +47,9 @@
 //! # Splitting
 //!
 //! In thin places most of the noise is that of S. A probe that takes more than half of the derivative is seen by two paths from there on.
+//! What these draw first are two points of one Sobol' sequence, so that they leave into opposite halves of the sphere, and the next
+//! two go on with the sequence of the pixel. One number of another sequence chooses the stretch and the place on it: what is left of a uniform
+//! number once it has made a choice is uniform again, so that probes of a pixel spread evenly along its rays.
 //!
 //! # Beside vertices
 //!
@@ -54,8 +57,9 @@
 //! the rest: the balance heuristic for densities σ_t T and c T, where c is a medium's
 //! [least extinction](World::share_of_vertices) that vertices see well. The parts depend on the place alone, so that
 //! they add up to one for vertices of any path, be they found by free flight, by the angle that a light is seen under, or from the
-//! emitter's end. Derivatives by the albedo and by the emission are shared in the same way, but do not call for probes where the
-//! extinction stays as it is: they are in proportion to σ_t, and vertices see them well for half the time.
+//! emitter's end. Derivatives by the albedo and by the emission are shared in the same way. They are in proportion to σ_t, so that nothing
+//! is lost where there are no vertices, but a thin body has a vertex on few of its rays, and whether it has one is most of their noise.
+//! Where nothing else is asked for, probes [count](World::weight_of_probes) in proportion to σ_t.
 //!
 //! # Motion
 //!
@@ -71,9 +75,11 @@
 
 use core::ops::ControlFlow;
 
+use drt_math::sobol::{self, SobolSampler};
 use drt_math::{Ray, Rgb, Rng, Vec3, fm};
 use drt_medium::Piece;
 
+use crate::sampling::streams::{PROBE_STREAM, SEQUENCE_STREAM};
 use crate::sampling::trace::{Arrival, Endpoint, OutgoingRay, Tracer};
 use crate::world::lights::Environment;
 use crate::world::vertex::{Kind, Vertex};
@@ -120,6 +126,12 @@ pub(crate) struct Probe {
 #[derive(Clone, Debug)]
 pub(crate) struct Probes {
     rng: Rng,
+    /// The path's number among those of its pixel.
+    unit: u32,
+    /// Names the sequence of the numbers of what probes see.
+    sequence: u32,
+    /// Uniform in what is left of the choice among the stretches so far.
+    choice: f64,
     total: f64,
     chosen: Option<Stretch>,
     /// The ray up to the end of the chosen stretch.
@@ -132,6 +144,9 @@ impl Probes {
     pub(crate) fn new() -> Self {
         Self {
             rng: Rng::new(0, 0, 0),
+            unit: 0,
+            sequence: 0,
+            choice: 0.5,
             total: 0.0,
             chosen: None,
             part: RayPath::default(),
@@ -139,9 +154,14 @@ impl Probes {
         }
     }
 
-    /// Forgets the last path.
-    pub(crate) fn begin(&mut self, rng: Rng) {
-        self.rng = rng;
+    /// Forgets the last path; the next is sample `unit` of a pixel.
+    pub(crate) fn begin(&mut self, seed: u64, pixel: u32, unit: u32) {
+        let stream = PROBE_STREAM | u64::from(pixel);
+        self.rng = Rng::new(seed, stream, unit);
+        self.unit = unit;
+        let mut names = Rng::new(seed, SEQUENCE_STREAM | stream, 0);
+        self.choice = sobol::sample(unit, 0, names.next_u32());
+        self.sequence = names.next_u32();
         self.total = 0.0;
         self.chosen = None;
     }
@@ -161,18 +181,20 @@ impl Probes {
         let mut mean = MeanPlace::default();
         for i in intervals(ray.medium, &ray.crossings, ray.length) {
             let Some(m) = i.medium.filter(|_| i.end > i.start) else { continue };
-            let floor = world.probed[m];
+            let probed = world.probed[m].is_some();
             let part = Ray::new(origin + dir * i.start, dir).until(i.end - i.start);
             world.medium(m).means(&part, &mut |piece: &Piece| {
                 let length = piece.end - piece.start;
                 let rates = [piece.mean, piece.minorant].map(least);
-                if let Some(floor) = floor.filter(|_| length > 0.0) {
-                    let scale = strength * 0.5 * (1.0 + floor / (floor + piece.mean.mean().abs()));
+                if probed && length > 0.0 {
+                    let scale = strength * world.weight_of_probes(m, piece.mean.mean().abs());
                     let [a, b] = passing.along(rates, length);
                     let weight = scale * (a + b);
                     self.total += weight;
                     mean.add(m, i.start + 0.5 * (piece.start + piece.end), weight);
-                    if self.rng.next_f64() * self.total < weight {
+                    let (taken, left) = divided(self.choice, weight / self.total);
+                    self.choice = left;
+                    if taken {
                         let start = i.start + piece.start;
                         let carries = leaving.carries();
                         self.chosen = Some(Stretch {
@@ -214,8 +236,9 @@ impl Probes {
         let s = self.chosen.take()?;
         let (world, rng) = (tracer.world, &mut self.rng);
         let [a, b] = s.passing.along(s.rates, s.length);
-        let rate = s.rates[usize::from(rng.next_f64() * (a + b) >= a)];
-        let within = exponential(rng.next_f64(), rate, s.length);
+        let (by_mean, left) = divided(self.choice, a / (a + b));
+        let rate = s.rates[usize::from(!by_mean)];
+        let within = exponential(left, rate, s.length);
         let [a, b] = s.passing.after(s.rates, within).0;
         let density = s.scale * (a + b) / self.total;
         let distance = s.start + within;
@@ -254,6 +277,11 @@ impl Probes {
     /// The random numbers of what a probe sees.
     pub(crate) fn numbers(&self) -> Rng {
         self.rng.clone()
+    }
+
+    /// What leads the numbers of path `k` of those that see it.
+    pub(crate) fn leading(&self, k: u32) -> SobolSampler {
+        SobolSampler::new(self.sequence, self.unit.wrapping_mul(SPLIT).wrapping_add(k))
     }
 }
 
@@ -312,6 +340,11 @@ fn control(world: &World, leaving: &OutgoingRay, ray: &RayPath, passing: f64, al
         _ => Rgb::ZERO,
     };
     radiance * (weight * through) + around * (1.0 - through)
+}
+
+/// Whether a uniform number is below `share`, and a uniform number that does not depend on the answer.
+fn divided(u: f64, share: f64) -> (bool, f64) {
+    if u < share { (true, u / share) } else { (false, (u - share) / (1.0 - share)) }
 }
 
 /// The extinction of the channel that lets most through.

@@ -8,6 +8,7 @@ use crate::derivative::velocity::PathVelocities;
 use crate::model::rendering::Counters;
 use crate::model::sensor::ViewSample;
 use crate::sampling::record::{Joint, JointObserver, LightPath, Node, PathRecord, Role};
+use crate::sampling::streams::DIMENSIONS;
 use crate::sampling::trace::{Arrival, Connection, Endpoint, Observer, OutgoingRay, Pixel, Tracer};
 use crate::terms::flux::{Flux, Reservoir};
 use crate::terms::interior::probe::{Probe, Probes};
@@ -122,7 +123,8 @@ impl<'a> Recorder<'_, 'a> {
             tracer.rng = probes.numbers();
             tracer.world = view.world;
             let mut seen = Rgb::ZERO;
-            for _ in 0..paths {
+            for k in 0..paths {
+                tracer.rng = tracer.rng.clone().led_by(probes.leading(k), DIMENSIONS);
                 seen += tracer.radiance_scattered(vertex, -arrival.dir, carries, segments);
             }
             view.probed = Some(seen * (1.0 / f64::from(paths)));
