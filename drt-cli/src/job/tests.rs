@@ -34,7 +34,7 @@ fn job(text: &str, set: &[(&str, &str)]) -> Result<Job, CliError> {
     folder.file("open.obj", CAGE.split("f 1 4 3").next().unwrap());
     folder.file("cage.ply", "ply\nformat");
     let set = set.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
-    load_job(&folder.file("job.toml", text), &Overrides { set, ..Overrides::default() })
+    read_job(&folder.file("job.toml", text), &Overrides { set, ..Overrides::default() })
 }
 
 /// A grid of two voxels along each axis.
@@ -308,7 +308,7 @@ fn errors_of_the_estimators_get_the_place_of_their_cause() {
 fn a_scene_alone_brings_its_own_sample_count() {
     let folder = Folder::new();
     let file: PathBuf = folder.file("s.xml", SCENE);
-    let mut j = Job::from_scene(&file, &Defaults::new()).unwrap();
+    let mut j = Job::read_scene(&file, &Defaults::new()).unwrap();
     assert_eq!(j.spp(), 64);
     j.select_sensor("cam").unwrap();
     assert_eq!((j.settings.sensor, j.spp()), (1, 9));
