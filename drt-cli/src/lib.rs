@@ -24,9 +24,9 @@ pub use files::image::{
 };
 pub use files::measured_file::encode_measured;
 pub use files::npy::write_npy;
-pub use job::{GroupSteps, Job, Optimize, Overrides, ParameterGroup, load_job};
+pub use job::{GroupSteps, Job, Optimize, Overrides, ParameterGroup, decode_job, read_job};
 pub use prepared::{FieldSteps, PreparedJob, Samples, Unknown, independent_seed};
-pub use scene_xml::{Defaults, load_scene, parse_scene_str};
+pub use scene_xml::{Defaults, decode_scene, read_scene};
 
 /// Name and version, as files carry them.
 pub const PROGRAM: &str = concat!("drt ", env!("CARGO_PKG_VERSION"));

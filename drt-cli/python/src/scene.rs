@@ -142,9 +142,12 @@ impl Scene {
     ) -> PyResult<Self> {
         Self::of(py, move || {
             if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
-                return drt_cli::load_job(&path, &Overrides { set, defaults });
+                return drt_cli::read_job(
+                    &path,
+                    &Overrides { set, defaults, ..Overrides::default() },
+                );
             }
-            Job::from_scene(&path, &defaults).map(Job::with_all_groups)
+            Job::read_scene(&path, &defaults).map(Job::with_all_groups)
         })
     }
 
@@ -157,8 +160,10 @@ impl Scene {
         defaults: Defaults,
     ) -> PyResult<Self> {
         let text = tables::text(keys)?;
-        let overrides = Overrides { set: Vec::new(), defaults };
-        Self::of(py, move || Job::from_text(&text, &folder.join("<job>"), &overrides))
+        let overrides = Overrides { defaults, ..Overrides::default() };
+        Self::of(py, move || {
+            drt_cli::decode_job(text.as_bytes(), &folder.join("<job>"), &overrides)
+        })
     }
 
     /// The text of the job; `None` of a scene alone.

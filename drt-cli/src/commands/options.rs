@@ -375,7 +375,8 @@ impl Changes {
     }
 
     pub(super) fn overrides(&self) -> Overrides {
-        Overrides { set: self.set.clone(), defaults: self.defaults.iter().cloned().collect() }
+        let defaults = self.defaults.iter().cloned().collect();
+        Overrides { set: self.set.clone(), defaults, ..Overrides::default() }
     }
 
     /// Refuses job keys where there is no job.

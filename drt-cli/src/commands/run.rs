@@ -10,7 +10,7 @@ use super::console;
 use super::monitor::Monitor;
 use super::noise::largest_noise;
 use super::options::{Changes, Options};
-use crate::job::{depth, read_job};
+use crate::job::{depth, read_job_by};
 use crate::scene_xml::SceneReader;
 use crate::wording::shown;
 use crate::{CliError, Job};
@@ -55,10 +55,10 @@ fn read_changed(
     let overrides = changes.overrides();
     let is_job = input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     let mut job = if is_job {
-        read_job(input, &overrides, scenes)?
+        read_job_by(input, &overrides, scenes)?
     } else {
         changes.refuse_set(input)?;
-        Job::read_scene(input, &overrides.defaults, scenes)?
+        Job::read_scene_by(input, &overrides.defaults, scenes)?
     };
     if !changes.quiet {
         for warning in &job.warnings {

@@ -58,8 +58,15 @@ pub(crate) fn unreadable(path: &Path, from: Option<&Place>, e: &io::Error) -> Cl
 
 /// Reads a text file that was named at `from`.
 pub(crate) fn read_text(path: &Path, from: Option<&Place>) -> Result<String, CliError> {
-    let bytes = read_at(path, from)?;
-    let not_text = |_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text");
-    let text = String::from_utf8(bytes).map_err(not_text);
-    text.map_err(|e| unreadable(path, from, &e))
+    let text = String::from_utf8(read_at(path, from)?);
+    text.map_err(|_| unreadable(path, from, &not_text()))
+}
+
+/// The text that bytes stand for; messages call it `path`.
+pub(crate) fn text_of<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a str, CliError> {
+    str::from_utf8(bytes).map_err(|_| unreadable(path, None, &not_text()))
+}
+
+fn not_text() -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text")
 }

@@ -28,8 +28,8 @@ use toml::Spanned;
 
 use crate::error::{Place, Warning};
 use crate::files::input_file;
-use crate::files::input_file::read_text;
-use crate::scene_xml::SceneReader;
+use crate::files::input_file::{read_text, text_of};
+use crate::scene_xml::{Read, SceneReader, decode};
 use crate::{CliError, Defaults};
 use cages::Cages;
 use document::Document;
@@ -43,6 +43,9 @@ pub struct Overrides {
     pub set: Vec<(String, String)>,
     /// Values of the scene's `<default>` names, as `-D NAME=VALUE` gives them.
     pub defaults: Defaults,
+    /// The contents of the scene's file, in place of what is stored under the name that the job gives; relative names in the
+    /// scene start from the folder of that name.
+    pub scene: Option<Vec<u8>>,
 }
 
 /// Most values of parameters that a message shows.
@@ -91,7 +94,7 @@ pub struct Job {
 /// Reads a job file and its scene.
 ///
 /// ```
-/// use drt_cli::{Overrides, load_job};
+/// use drt_cli::{Overrides, read_job};
 ///
 /// # let folder = tempfile::tempdir()?;
 /// # let path = folder.path().join("job.toml");
@@ -109,7 +112,7 @@ pub struct Job {
 ///        multiply = 1.0"#,
 /// )?;
 /// let set = vec![("estimator.spp".into(), "16".into())];
-/// let job = load_job(&path, &Overrides { set, ..Overrides::default() })?;
+/// let job = read_job(&path, &Overrides { set, ..Overrides::default() })?;
 /// assert_eq!((job.spp(), job.parameters[0].name.as_str()), (16, "light"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -117,12 +120,12 @@ pub struct Job {
 /// # Errors
 /// Names the file, line and key, or the `--set`, of what is malformed, unknown, missing or not
 /// supported.
-pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
-    read_job(path, overrides, &mut SceneReader::default())
+pub fn read_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
+    read_job_by(path, overrides, &mut SceneReader::default())
 }
 
-/// As [`load_job`], with a reader that may know the scene.
-pub(crate) fn read_job(
+/// As [`read_job`], with a reader that may know the scene.
+pub(crate) fn read_job_by(
     path: &Path,
     overrides: &Overrides,
     scenes: &mut SceneReader,
@@ -130,7 +133,32 @@ pub(crate) fn read_job(
     parse(path, &read_text(path, None)?, overrides, scenes)
 }
 
-/// Reads a job from its text; relative file names start from the folder of `path`, by which messages call it.
+/// Reads a job from the bytes of its text, as [`read_job`] does from a file. Relative file names start from the folder of
+/// `path`, by which messages call the text; such a file need not exist.
+///
+/// The job's scene is read from the file that its key `scene` names, unless [`Overrides::scene`] has it:
+///
+/// ```
+/// use std::path::Path;
+///
+/// use drt_cli::{Overrides, decode_job};
+///
+/// let scene = br#"<scene version="3.0.0"><emitter type="constant" id="sky"/></scene>"#.to_vec();
+/// let overrides = Overrides { scene: Some(scene), ..Overrides::default() };
+/// let job = decode_job(b"scene = \"sky.xml\"", Path::new("open/job.toml"), &overrides)?;
+/// assert_eq!(job.scene.emitters.len(), 1);
+///
+/// let error = decode_job(b"scene = 1", Path::new("open/job.toml"), &overrides).unwrap_err();
+/// assert!(error.to_string().starts_with("open/job.toml:1:9: "));
+/// # Ok::<(), drt_cli::CliError>(())
+/// ```
+///
+/// # Errors
+/// As [`read_job`].
+pub fn decode_job(bytes: &[u8], path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
+    parse(path, text_of(bytes, path)?, overrides, &mut SceneReader::default())
+}
+
 fn parse(
     path: &Path,
     text: &str,
@@ -140,8 +168,11 @@ fn parse(
     let document = Document::new(path, text, &overrides.set);
     let keys: keys::Job = document.parse()?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let scene_path = scene_file(&document, &keys.scene, folder)?;
-    let (mut scene, warnings, mut read) = scenes.read(&scene_path, &overrides.defaults)?;
+    let scene_path = scene_file(&document, &keys.scene, folder, overrides.scene.is_some())?;
+    let (mut scene, warnings, mut read) = match &overrides.scene {
+        Some(bytes) => decode(bytes, &scene_path, &overrides.defaults)?,
+        None => scenes.read(&scene_path, &overrides.defaults)?,
+    };
     if !(keys.parameter.is_empty() && keys.parameter_group.is_empty()) {
         let expanded = scene.expanded().map(std::borrow::Cow::into_owned);
         scene = expanded.map_err(|e| CliError::input(&Place::file(&scene_path), e))?;
@@ -179,46 +210,53 @@ fn parse(
     Ok(job)
 }
 
-/// The file of the scene that a job names.
+/// The file of the scene that a job names; it need not exist where its contents are given.
 fn scene_file(
     document: &Document<'_>,
     key: &Spanned<PathBuf>,
     folder: &Path,
+    given: bool,
 ) -> Result<PathBuf, CliError> {
     let fail = |message: String| document.error_at(key.span().start, format!("`scene`{message}"));
     if key.get_ref().as_os_str().is_empty() {
         return Err(fail(" is empty; expected a file such as \"scene.xml\"".into()));
     }
     let path = folder.join(key.get_ref());
-    input_file::check(&path).map_err(|e| fail(format!(": cannot read {}: {e}", path.display())))?;
+    if !given {
+        let unreadable = |e| fail(format!(": cannot read {}: {e}", path.display()));
+        input_file::check(&path).map_err(unreadable)?;
+    }
     Ok(path)
 }
 
 impl Job {
-    /// A scene alone, with the number of samples its sensor asks for.
+    /// Reads a scene alone, with the number of samples that its sensor asks for.
     ///
     /// # Errors
-    /// As [`load_scene`](crate::load_scene).
-    pub fn from_scene(path: &Path, defaults: &Defaults) -> Result<Self, CliError> {
-        Self::read_scene(path, defaults, &mut SceneReader::default())
+    /// As [`read_scene`](crate::read_scene).
+    pub fn read_scene(path: &Path, defaults: &Defaults) -> Result<Self, CliError> {
+        Self::read_scene_by(path, defaults, &mut SceneReader::default())
     }
 
-    /// Reads a job from its text, as [`load_job`] does from a file. Relative file names start from the folder of `path`, by
-    /// which messages call the text; there need not be such a file.
-    ///
-    /// # Errors
-    /// As [`load_job`].
-    pub fn from_text(text: &str, path: &Path, overrides: &Overrides) -> Result<Self, CliError> {
-        parse(path, text, overrides, &mut SceneReader::default())
-    }
-
-    /// As [`Job::from_scene`], with a reader that may know the scene.
-    pub(crate) fn read_scene(
+    /// As [`Job::read_scene`], with a reader that may know the scene.
+    pub(crate) fn read_scene_by(
         path: &Path,
         defaults: &Defaults,
         scenes: &mut SceneReader,
     ) -> Result<Self, CliError> {
-        let (scene, warnings, files) = scenes.read(path, defaults)?;
+        Ok(Self::of_scene(path, defaults, scenes.read(path, defaults)?))
+    }
+
+    /// Reads a scene alone from the bytes of its text; `path` has the meaning that it has for
+    /// [`decode_scene`](crate::decode_scene).
+    ///
+    /// # Errors
+    /// As [`read_scene`](crate::read_scene).
+    pub fn decode_scene(bytes: &[u8], path: &Path, defaults: &Defaults) -> Result<Self, CliError> {
+        Ok(Self::of_scene(path, defaults, decode(bytes, path, defaults)?))
+    }
+
+    fn of_scene(path: &Path, defaults: &Defaults, (scene, warnings, files): Read) -> Self {
         let mut job = Self {
             path: path.into(),
             text: None,
@@ -237,7 +275,7 @@ impl Job {
             defaults: defaults.clone(),
         };
         job.take_sample_count();
-        Ok(job)
+        job
     }
 
     /// Where no job says how many samples to take, the sensor's sampler does.

@@ -50,7 +50,7 @@ pub enum Unknown {
 /// the number of samples changes. For derivative images it is also decided anew when values change.
 ///
 /// ```
-/// use drt_cli::{Overrides, PreparedJob, Samples, Unknown, load_job};
+/// use drt_cli::{Overrides, PreparedJob, Samples, Unknown, read_job};
 /// use drt_estimators::Unattended;
 /// use drt_math::Rgb;
 ///
@@ -62,7 +62,7 @@ pub enum Unknown {
 /// # std::fs::write(folder.path().join("scene.xml"), scene)?;
 /// # let parameter = "name = \"light\"\neffect = [{ target = \"sky\", property = \"radiance\", multiply = 1.0 }]";
 /// # std::fs::write(&path, format!("scene = \"scene.xml\"\n[[parameter]]\n{parameter}\n"))?;
-/// let mut job = PreparedJob::new(load_job(&path, &Overrides::default())?)?;
+/// let mut job = PreparedJob::new(read_job(&path, &Overrides::default())?)?;
 /// let light = Unknown::Parameter(0);
 /// let samples = Samples { spp: 64, ..job.samples() };
 ///

@@ -5,7 +5,7 @@ use drt_math::Rgb;
 
 use super::{PreparedJob, Samples, Unknown};
 use crate::testing::{Folder, TETRAHEDRON};
-use crate::{Overrides, load_job};
+use crate::{Overrides, read_job};
 
 const SCENE: &str = r#"<scene version="3.0.0">
     <integrator type="path"><integer name="max_depth" value="3"/></integrator>
@@ -45,7 +45,7 @@ fn prepared() -> Prepared {
     folder.file("body.obj", TETRAHEDRON);
     folder.file("scene.xml", SCENE);
     let path = folder.file("job.toml", JOB);
-    let job = load_job(&path, &Overrides::default()).expect("a job");
+    let job = read_job(&path, &Overrides::default()).expect("a job");
     Prepared { job: PreparedJob::new(job).expect("no name twice"), _folder: folder }
 }
 

@@ -39,7 +39,7 @@ use drt_math::Rgb;
 
 use crate::CliError;
 use crate::error::{Place, Warning};
-use crate::files::input_file::read_text;
+use crate::files::input_file::{read_text, text_of};
 use element::Element;
 use index::Index;
 use properties::Properties;
@@ -50,7 +50,7 @@ use source::SceneFiles;
 /// Reads a scene file; `defaults` override its `<default>` values.
 ///
 /// ```
-/// use drt_cli::{Defaults, load_scene};
+/// use drt_cli::{Defaults, read_scene};
 ///
 /// # let folder = tempfile::tempdir()?;
 /// # let path = folder.path().join("scene.xml");
@@ -66,14 +66,14 @@ use source::SceneFiles;
 ///          </sensor>
 ///        </scene>"#,
 /// )?;
-/// let scene = load_scene(&path, &Defaults::from([("size".into(), "32".into())]))?;
+/// let scene = read_scene(&path, &Defaults::from([("size".into(), "32".into())]))?;
 /// assert_eq!(scene.sensors[0].item.sensor.film(), [32, 48]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
 /// Names the file, line and element of what is malformed, missing or not supported.
-pub fn load_scene(path: &Path, defaults: &Defaults) -> Result<Scene, CliError> {
+pub fn read_scene(path: &Path, defaults: &Defaults) -> Result<Scene, CliError> {
     SceneReader::default().read(path, defaults).map(|(scene, ..)| scene)
 }
 
@@ -84,10 +84,10 @@ pub(crate) struct SceneReader {
 }
 
 /// A scene, what in it was passed over, and the files that it was read from.
-type Read = (Scene, Vec<Warning>, Vec<PathBuf>);
+pub(crate) type Read = (Scene, Vec<Warning>, Vec<PathBuf>);
 
 impl SceneReader {
-    /// As [`load_scene`], with what was passed over.
+    /// As [`read_scene`], with what was passed over.
     pub(crate) fn read(&mut self, path: &Path, defaults: &Defaults) -> Result<Read, CliError> {
         if let Some((_, _, read)) =
             self.last.as_ref().filter(|(p, d, _)| p == path && d == defaults)
@@ -102,21 +102,29 @@ impl SceneReader {
     }
 }
 
-/// Reads a scene from text; relative file names start from `base_dir`.
+/// Reads a scene from the bytes of its text, as [`read_scene`] does from a file. Relative file names start from the folder of
+/// `path`, by which messages call the text; such a file need not exist.
 ///
 /// ```
-/// let scene = drt_cli::parse_scene_str(
-///     r#"<scene version="3.0.0"><emitter type="constant" id="sky"/></scene>"#,
-///     std::path::Path::new("."),
-/// )?;
+/// use std::path::Path;
+///
+/// use drt_cli::{Defaults, decode_scene};
+///
+/// let xml = br#"<scene version="3.0.0"><emitter type="constant" id="sky"/></scene>"#;
+/// let scene = decode_scene(xml, Path::new("sky.xml"), &Defaults::new())?;
 /// assert_eq!(scene.emitters.len(), 1);
 /// # Ok::<(), drt_cli::CliError>(())
 /// ```
 ///
 /// # Errors
-/// As [`load_scene`].
-pub fn parse_scene_str(xml: &str, base_dir: &Path) -> Result<Scene, CliError> {
-    parse_scene(&base_dir.join("scene.xml"), xml, &Defaults::new()).map(|(scene, ..)| scene)
+/// As [`read_scene`].
+pub fn decode_scene(bytes: &[u8], path: &Path, defaults: &Defaults) -> Result<Scene, CliError> {
+    decode(bytes, path, defaults).map(|(scene, ..)| scene)
+}
+
+/// Reads a scene as [`decode_scene`] does, with what was passed over and the files that were read.
+pub(crate) fn decode(bytes: &[u8], path: &Path, defaults: &Defaults) -> Result<Read, CliError> {
+    parse_scene(path, text_of(bytes, path)?, defaults)
 }
 
 fn parse_scene(path: &Path, text: &str, defaults: &Defaults) -> Result<Read, CliError> {

@@ -114,7 +114,7 @@ impl fmt::Display for Plan {
         writeln!(f, "image: {image}{ends}")?;
         for (what, choice) in [("sampling", &self.sampling), ("estimator", &self.estimator)] {
             if let Some(choice) = choice {
-                writeln!(f, "{what}: {choice}")?;
+                writeln!(f, "choice of {what}: {choice}")?;
             }
         }
         writeln!(f, "path record: {}", yes(self.record))?;

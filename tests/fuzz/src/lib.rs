@@ -10,6 +10,7 @@
 
 use std::path::{Path, PathBuf};
 
+use drt_cli::{Defaults, decode_scene};
 use drt_estimators::{Depth, Scene, Session, Settings, Unattended};
 use drt_geom::{Mesh, Ray, Skip, TetLocator, TetMesh, TriangleBvh};
 use drt_math::{Vec3, vec3};
@@ -43,6 +44,12 @@ pub fn use_tetrahedra(mesh: &TetMesh) {
             assert!(found.is_none_or(|p| (p.tet as usize) < mesh.tets.len()));
         }
     }
+}
+
+/// Reads a scene whose files are in a folder; `None` where it is refused.
+#[must_use]
+pub fn scene_in(folder: &Path, text: &str) -> Option<Scene> {
+    decode_scene(text.as_bytes(), &folder.join("scene.xml"), &Defaults::new()).ok()
 }
 
 /// Renders a few pixels. A scene may still be refused, but not crash, nor have infinite pixels.

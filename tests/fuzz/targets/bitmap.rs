@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use drt_estimators::Settings;
-use drt_fuzz::{folder, use_scene, write};
+use drt_fuzz::{folder, scene_in, use_scene, write};
 use libfuzzer_sys::fuzz_target;
 
 const KINDS: [&str; 5] = ["png", "jpg", "bmp", "hdr", "exr"];
@@ -33,7 +33,7 @@ fuzz_target!(|bytes: &[u8]| {
             r#"<scene version="3.0.0"><sensor type="perspective"><transform name="to_world">
                <lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform></sensor>{inside}</scene>"#
         );
-        if let Ok(scene) = drt_cli::parse_scene_str(&scene, &FOLDER) {
+        if let Some(scene) = scene_in(&FOLDER, &scene) {
             use_scene(scene, &[], &Settings::default());
         }
     }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use drt_estimators::Settings;
-use drt_fuzz::{folder, use_scene, write};
+use drt_fuzz::{folder, scene_in, use_scene, write};
 use libfuzzer_sys::fuzz_target;
 
 const SCENE: &str = r#"<scene version="3.0.0"><sensor type="perspective"><transform name="to_world">
@@ -18,7 +18,7 @@ static FOLDER: LazyLock<PathBuf> = LazyLock::new(folder);
 
 fuzz_target!(|bytes: &[u8]| {
     write(&FOLDER.join("m.bsdf"), bytes);
-    if let Ok(scene) = drt_cli::parse_scene_str(SCENE, &FOLDER) {
+    if let Some(scene) = scene_in(&FOLDER, SCENE) {
         use_scene(scene, &[], &Settings::default());
     }
 });

@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use drt_fuzz::{folder, use_mesh, write};
+use drt_fuzz::{folder, scene_in, use_mesh, write};
 use libfuzzer_sys::fuzz_target;
 
 static FOLDER: LazyLock<PathBuf> = LazyLock::new(folder);
@@ -18,7 +18,7 @@ fuzz_target!(|bytes: &[u8]| {
                <string name="filename" value="mesh.serialized"/>
                <integer name="shape_index" value="{index}"/></shape></scene>"#
         );
-        if let Ok(scene) = drt_cli::parse_scene_str(&scene, &FOLDER) {
+        if let Some(scene) = scene_in(&FOLDER, &scene) {
             scene.shapes.iter().for_each(|s| use_mesh(&s.mesh));
         }
     }

@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use drt_fuzz::{folder, write};
+use drt_fuzz::{folder, scene_in, write};
 use libfuzzer_sys::fuzz_target;
 
 static FOLDER: LazyLock<PathBuf> = LazyLock::new(folder);
@@ -20,7 +20,7 @@ fuzz_target!(|text: &str| {
             r#"<scene version="3.0.0"><bsdf type="diffuse"><spectrum name="reflectance" {attribute}/></bsdf>
                <emitter type="point"><spectrum name="intensity" {attribute}/></emitter></scene>"#
         );
-        if let Ok(scene) = drt_cli::parse_scene_str(&scene, &FOLDER) {
+        if let Some(scene) = scene_in(&FOLDER, &scene) {
             scene.emitters.iter().for_each(|e| {
                 e.item.emitter.validate().expect("a reader's emitter is valid");
             });

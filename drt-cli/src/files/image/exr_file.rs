@@ -112,11 +112,13 @@ pub(super) const CHANNELS: [&str; 3] = ["R", "G", "B"];
 /// Writes a result, with further images (such as finite differences) by layer name.
 ///
 /// ```
-/// use drt_cli::{Provenance, parse_scene_str, read_exr, write_exr};
+/// use std::path::Path;
+///
+/// use drt_cli::{Defaults, Provenance, decode_scene, read_exr, write_exr};
 /// use drt_estimators::{Session, Settings, Unattended};
 ///
-/// let scene = parse_scene_str(
-///     r#"<scene version="3.0.0">
+/// let scene = decode_scene(
+///     br#"<scene version="3.0.0">
 ///          <sensor type="perspective">
 ///            <film type="hdrfilm">
 ///              <integer name="width" value="4"/>
@@ -125,7 +127,8 @@ pub(super) const CHANNELS: [&str; 3] = ["R", "G", "B"];
 ///          </sensor>
 ///          <emitter type="constant" id="sky"/>
 ///        </scene>"#,
-///     std::path::Path::new("."),
+///     Path::new("scene.xml"),
+///     &Defaults::new(),
 /// )?;
 /// let mut session = Session::new(&scene, &[], &Settings::default())?;
 /// session.run(1, &Unattended);

@@ -4,7 +4,7 @@ use drt_math::{Rgb, Vec3, vec3};
 
 use super::{old_scene, refused, scene};
 use crate::testing::Folder;
-use crate::{Defaults, load_scene};
+use crate::{Defaults, read_scene};
 
 fn emitter(kind: &str, inside: &str) -> Emitter {
     scene(&format!("<emitter type=\"{kind}\">{inside}</emitter>")).emitters.remove(0).item.emitter
@@ -133,7 +133,7 @@ fn environments_are_images() {
             "<scene version=\"3.0.0\"><emitter type=\"envmap\" id=\"sky\">\
              <string name=\"filename\" value=\"{name}\"/>{inside}</emitter></scene>"
         );
-        crate::load_scene(&folder.file("s.xml", body), &crate::Defaults::new())
+        crate::read_scene(&folder.file("s.xml", body), &crate::Defaults::new())
     };
     let turned = "<float name=\"scale\" value=\"2\"/><transform name=\"to_world\">\
                   <rotate x=\"1\" angle=\"180\"/></transform>";
@@ -169,7 +169,7 @@ fn pictures_are_upright() {
              <boolean name=\"raw\" value=\"true\"/><string name=\"filter_type\" value=\"nearest\"/>\
              </texture>{inside}</emitter></scene>"
         );
-        let scene = crate::load_scene(&folder.file("s.xml", body), &crate::Defaults::new());
+        let scene = crate::read_scene(&folder.file("s.xml", body), &crate::Defaults::new());
         scene.unwrap().emitters.remove(0).item.emitter
     };
     let towards = |e: &Emitter, x: f64, y: f64| {
@@ -223,7 +223,7 @@ fn volume_lights() {
     let glow = |albedo: &str| {
         let inside = body(albedo, &within.replace(light, grid));
         let file = folder.file("s.xml", format!("<scene version=\"3.0.0\">{inside}</scene>"));
-        load_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
+        read_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
     };
     let m = glow(r#"<rgb name="albedo" value="0.75 0.9 0.5"/>"#).unwrap();
     let source = m.coefficients(vec3(0.5, 0.5, 0.5)).source();

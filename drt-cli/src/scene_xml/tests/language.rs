@@ -6,7 +6,7 @@ use drt_math::Rgb;
 
 use super::{read, refused, scene};
 use crate::testing::Folder;
-use crate::{Defaults, load_scene};
+use crate::{Defaults, read_scene};
 
 fn reflectance(b: &Bsdf) -> Rgb {
     match b {
@@ -25,7 +25,7 @@ fn defaults_fill_in_and_the_command_line_wins() {
     );
     let with = |pairs: &[(&str, &str)]| {
         let defaults: Defaults = pairs.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
-        load_scene(&file, &defaults)
+        read_scene(&file, &defaults)
     };
     let s = with(&[("kind", "diffuse")]).unwrap();
     assert_eq!(reflectance(&s.bsdfs[0].item), Rgb::new(0.25, 0.0, 1.0));
@@ -51,16 +51,16 @@ fn included_files_have_their_own_folder_dialect_and_lines() {
         "s.xml",
         "<scene version=\"3.0.0\"><include filename=\"parts/a.xml\"/><shape type=\"cube\"/></scene>",
     );
-    let s = load_scene(&file, &Defaults::new()).unwrap();
+    let s = read_scene(&file, &Defaults::new()).unwrap();
     assert_eq!(s.shapes[0].mesh.triangles.len(), 4);
     assert_eq!(s.shapes[1].mesh.triangles.len(), 12);
 
     folder.file("parts/a.xml", "<scene version=\"3.0.0\">\n\n<shape type=\"pyramid\"/></scene>");
-    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    let message = read_scene(&file, &Defaults::new()).unwrap_err().to_string();
     assert!(message.contains("a.xml:3: <shape type=\"pyramid\">"), "{message}");
 
     folder.file("parts/a.xml", "<scene version=\"3.0.0\"><include filename=\"../s.xml\"/></scene>");
-    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    let message = read_scene(&file, &Defaults::new()).unwrap_err().to_string();
     assert!(message.contains("includes itself"), "{message}");
     refused("<include filename=\"nowhere.xml\"/>", &[":2:", "nowhere.xml"]);
 }
@@ -91,15 +91,15 @@ fn files_are_searched_as_mitsuba_does() {
         part(&[mesh("main.obj"), mesh("far.obj"), mesh("both.obj")].concat()),
     );
     let file = folder.file("s.xml", part("<include filename=\"parts/a.xml\"/>"));
-    assert_eq!(load_scene(&file, &Defaults::new()).unwrap().shapes.len(), 4);
+    assert_eq!(read_scene(&file, &Defaults::new()).unwrap().shapes.len(), 4);
 
     let file = folder.file("s.xml", part(&["<path value=\"common\"/>", &mesh("no.obj")].concat()));
-    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    let message = read_scene(&file, &Defaults::new()).unwrap_err().to_string();
     assert!(message.contains("no file `no.obj`; searched"), "{message}");
     assert!(message.contains("s.xml:1") && message.contains("common"), "{message}");
     refused("<path value=\"nowhere\"/>", &[":2", "no file `nowhere`"]);
     let file = folder.file("s.xml", part("<path value=\"main.obj\"/>"));
-    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    let message = read_scene(&file, &Defaults::new()).unwrap_err().to_string();
     assert!(message.contains("is not a folder"), "{message}");
 }
 
@@ -206,14 +206,13 @@ fn mistakes_are_told_with_their_line() {
     refused(twice, &[":3", "given twice"]);
     let deep = format!("{}{}", "<bsdf type=\"twosided\">".repeat(70), "</bsdf>".repeat(70));
     refused(&deep, &["nest deeper"]);
-    let place = std::path::Path::new(".");
     for (text, part) in [
         ("<scene/>", "`version` is missing"),
         ("<scene version=\"1.0\"/>", "version `1.0`"),
         ("<mesh/>", "found <mesh>"),
         ("", "not well-formed"),
     ] {
-        let message = crate::parse_scene_str(text, place).unwrap_err().to_string();
+        let message = super::decode(text).unwrap_err().to_string();
         assert!(message.contains(part), "{message}");
     }
 }
@@ -245,8 +244,7 @@ fn damaged_text_never_panics() {
         <emitter type="spot"><float name="cutoffAngle" value="30"/></emitter>
         <sensor type="perspective"><float name="fov" value="30"/><film type="hdrfilm">
         <integer name="width" value="3"/><rfilter type="tent"/></film></sensor></scene>"##;
-    let base = std::path::Path::new(".");
-    crate::parse_scene_str(text, base).unwrap();
+    super::decode(text).unwrap();
     let mut rng = drt_math::Rng::new(7, 0, 0);
     let mut below = |n: usize| (rng.next_f64() * n as f64) as usize;
     let words = ["", "-1", "1e308", "nan", "\"", ">", "<", "/", "$", "&#0;", "0 0 0", "é", "ref"];
@@ -258,9 +256,8 @@ fn damaged_text_never_panics() {
             let end = (at + below(6)).min(bytes.len());
             bytes.splice(at..end, words[below(words.len())].bytes());
         }
-        if let Ok(text) = String::from_utf8(bytes) {
-            read += usize::from(crate::parse_scene_str(&text, base).is_ok());
-        }
+        let path = std::path::Path::new("scene.xml");
+        read += usize::from(crate::decode_scene(&bytes, path, &Defaults::new()).is_ok());
     }
     assert!(read > 0, "some damage is harmless");
 }

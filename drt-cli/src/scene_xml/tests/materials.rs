@@ -289,7 +289,7 @@ fn measured_materials() {
         </scene>"#;
     let read = |bytes: &[u8]| {
         folder.file("m.bsdf", bytes);
-        crate::parse_scene_str(body, folder.path())
+        crate::read_scene(&folder.file("scene.xml", body), &crate::Defaults::new())
     };
     let scene = read(&good).unwrap();
     let Bsdf::Measured(a) = &scene.bsdfs[0].item else { panic!() };

@@ -5,7 +5,7 @@ use drt_medium::{Coefficients, Grid, LocalPhase, Medium, MediumKind, Phase, Prop
 
 use super::{old_scene, refused, scene};
 use crate::testing::Folder;
-use crate::{Defaults, load_scene};
+use crate::{Defaults, read_scene};
 
 fn medium(kind: &str, inside: &str) -> Medium {
     scene(&format!("<medium type=\"{kind}\">{inside}</medium>")).media.remove(0).item
@@ -122,7 +122,7 @@ fn grids_of_nanovdb() {
         density(&name.replace("smoke", "heat"))
     );
     let path = folder.file("s.xml", other);
-    let error = load_scene(&path, &Defaults::new()).unwrap_err().to_string();
+    let error = read_scene(&path, &Defaults::new()).unwrap_err().to_string();
     assert!(
         error.contains("ramp.nvdb") && error.contains("the list of grids is `smoke`"),
         "{error}"
@@ -141,7 +141,7 @@ fn grid_medium(folder: &Folder, version: &str, inside: &str) -> Medium {
         "<scene version=\"{version}\"><medium type=\"heterogeneous\">{inside}</medium></scene>"
     );
     let file = folder.file("s.xml", text);
-    load_scene(&file, &Defaults::new()).unwrap().media.remove(0).item
+    read_scene(&file, &Defaults::new()).unwrap().media.remove(0).item
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn homogeneous_media_take_their_albedo_from_a_grid() {
     };
     let load = |inside: &str| {
         let file = folder.file("s.xml", text(inside));
-        load_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
+        read_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
     };
     let m = load(&inside).unwrap();
     let (near, far) = (vec3(0.375, 0.5, 0.5), vec3(9.0, 0.5, 0.5));
@@ -249,7 +249,7 @@ fn phase_functions_take_their_numbers_from_grids() {
             "<scene version=\"3.0.0\"><medium type=\"homogeneous\">{phase}</medium></scene>"
         );
         let file = folder.file("s.xml", text);
-        load_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
+        read_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
     };
     let at = |x: f64| vec3(x, 0.5, 0.5);
     let hg = |file: &str| format!("<phase type=\"hg\">{}</phase>", grid("g", file));
@@ -292,7 +292,7 @@ fn absorbing_and_scattering_grids() {
     let text =
         format!("<scene version=\"3.0.0\"><medium type=\"heterogeneous\">{both}</medium></scene>");
     let file = folder.file("s.xml", text);
-    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    let message = read_scene(&file, &Defaults::new()).unwrap_err().to_string();
     assert!(message.contains("give `sigma_t` and `albedo`"), "{message}");
 }
 
@@ -342,7 +342,7 @@ fn microflakes_are_read_from_six_channels() {
              </phase></medium></scene>"
         );
         let file = folder.file("s.xml", text);
-        load_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
+        read_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
     };
     let of = |file: &str| {
         format!(

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use drt_estimators::Scene;
 
-use crate::{CliError, parse_scene_str};
+use crate::{CliError, Defaults, decode_scene};
 
 /// A scene of version 3 around `body`, which starts at line 2.
 fn read(body: &str) -> Result<Scene, CliError> {
@@ -20,7 +20,11 @@ fn read(body: &str) -> Result<Scene, CliError> {
 }
 
 fn read_version(version: &str, body: &str) -> Result<Scene, CliError> {
-    parse_scene_str(&format!("<scene version=\"{version}\">\n{body}\n</scene>"), Path::new("dir"))
+    decode(&format!("<scene version=\"{version}\">\n{body}\n</scene>"))
+}
+
+fn decode(text: &str) -> Result<Scene, CliError> {
+    decode_scene(text.as_bytes(), Path::new("dir/scene.xml"), &Defaults::new())
 }
 
 fn scene(body: &str) -> Scene {

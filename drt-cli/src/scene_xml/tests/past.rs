@@ -10,7 +10,7 @@ use drt_math::Rgb;
 use super::{old_scene, read, read_version, refused, scene};
 use crate::scene_xml::parse_scene;
 use crate::testing::Folder;
-use crate::{Defaults, load_scene};
+use crate::{Defaults, read_scene};
 
 /// A scene with the notes on it.
 fn noted(version: &str, body: &str) -> (Scene, Vec<String>) {
@@ -234,7 +234,7 @@ fn shapes_without_area_are_left_out() {
     let body =
         |inner: &str| format!("<scene version=\"3.0.0\">{inner}<shape type=\"cube\"/></scene>");
     let file = folder.file("s.xml", body(flat));
-    assert_eq!(load_scene(&file, &Defaults::new()).unwrap().shapes.len(), 1);
+    assert_eq!(read_scene(&file, &Defaults::new()).unwrap().shapes.len(), 1);
     let text = body(flat);
     let (_, notes, _) = parse_scene(&file, &text, &Defaults::new()).unwrap();
     assert!(notes.len() == 1 && notes[0].message.contains("flat.obj"), "{notes:?}");
@@ -313,10 +313,10 @@ fn files_are_searched_in_the_working_directory_last() {
     let folder = Folder::new();
     let body = r#"<scene version="3.0.0"><shape type="obj"><string name="filename" value="Cargo.toml"/></shape></scene>"#;
     let file = folder.file("s.xml", body);
-    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    let message = read_scene(&file, &Defaults::new()).unwrap_err().to_string();
     assert!(!message.contains("no file"), "{message}");
     folder.file("Cargo.toml", crate::testing::TETRAHEDRON);
-    assert_eq!(load_scene(&file, &Defaults::new()).unwrap().shapes[0].mesh.triangles.len(), 4);
+    assert_eq!(read_scene(&file, &Defaults::new()).unwrap().shapes[0].mesh.triangles.len(), 4);
 }
 
 #[cfg(unix)]
@@ -330,7 +330,7 @@ fn devices_are_no_files_to_read() {
     ] {
         refused(body, &["/dev/zero", "regular file"]);
     }
-    let message = load_scene(Path::new("/dev/zero"), &Defaults::new()).unwrap_err().to_string();
+    let message = read_scene(Path::new("/dev/zero"), &Defaults::new()).unwrap_err().to_string();
     assert!(message.contains("regular file"), "{message}");
 }
 

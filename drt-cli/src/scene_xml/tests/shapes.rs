@@ -3,7 +3,7 @@ use drt_math::{Vec3, vec3};
 
 use super::{refused, scene};
 use crate::testing::{Folder, TETRAHEDRON};
-use crate::{Defaults, load_scene};
+use crate::{Defaults, read_scene};
 
 fn shape(body: &str) -> Shape {
     scene(body).shapes.remove(0)
@@ -11,7 +11,7 @@ fn shape(body: &str) -> Shape {
 
 fn from_folder(folder: &Folder, body: &str) -> Scene {
     let file = folder.file("s.xml", format!("<scene version=\"3.0.0\">{body}</scene>"));
-    load_scene(&file, &Defaults::new()).unwrap()
+    read_scene(&file, &Defaults::new()).unwrap()
 }
 
 #[test]
@@ -117,7 +117,7 @@ fn serialized_files() {
             "<scene version=\"3.0.0\"><shape type=\"serialized\"><string name=\"filename\" \
              value=\"m.serialized\"/>{inside}</shape></scene>"
         );
-        load_scene(&folder.file("s.xml", body), &Defaults::new())
+        read_scene(&folder.file("s.xml", body), &Defaults::new())
     };
     let second = r#"<integer name="shape_index" value="1"/>"#;
     for (version, flags) in [(3, 0x1003), (4, 0x1003), (4, 0x2003), (4, 0x1000)] {
@@ -243,7 +243,7 @@ fn unusable_files_name_scene_line_and_cause() {
         "<scene version=\"3.0.0\">\n<shape type=\"obj\"><string name=\"filename\" \
          value=\"cut.obj\"/></shape></scene>",
     );
-    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    let message = read_scene(&file, &Defaults::new()).unwrap_err().to_string();
     for part in ["s.xml:2: <shape type=\"obj\">", "cut.obj:2"] {
         assert!(message.contains(part), "{message}");
     }

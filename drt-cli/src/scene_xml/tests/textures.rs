@@ -11,11 +11,11 @@ use drt_medium::vol::{VolFile, encode};
 
 use super::{refused, scene};
 use crate::testing::Folder;
-use crate::{CliError, Defaults, load_scene};
+use crate::{CliError, Defaults, read_scene};
 
 fn load(folder: &Folder, body: &str) -> Result<Scene, CliError> {
     let file = folder.file("s.xml", format!("<scene version=\"3.0.0\">\n{body}</scene>"));
-    load_scene(&file, &Defaults::new())
+    read_scene(&file, &Defaults::new())
 }
 
 fn textures(bsdf: &Bsdf) -> &[(Property, Texture)] {

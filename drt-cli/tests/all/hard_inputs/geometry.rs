@@ -44,7 +44,7 @@ fn dropped_triangles_are_told() {
     folder.file("s.xml", from_file("obj", "m.obj"));
     folder.file("m.obj", format!("{SQUARE}f 1 2 3\nf 1 1 2\nf 2 3 1\nf 1 3 2\n"));
     let path = folder.path().join("s.xml");
-    let job = drt_cli::Job::from_scene(&path, &drt_cli::Defaults::new()).unwrap();
+    let job = drt_cli::Job::read_scene(&path, &drt_cli::Defaults::new()).unwrap();
     let told: Vec<_> = job.warnings.iter().map(ToString::to_string).collect();
     assert_eq!(told.len(), 1);
     for part in ["s.xml:6: <shape type=\"obj\" id=\"mesh\">", "dropped 2 of 4 triangles"] {
