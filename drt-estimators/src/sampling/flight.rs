@@ -118,7 +118,8 @@ impl Tracer<'_> {
             .filter_map(|i| i.medium.map(|m| proxy_extinction(world, m, None) * (i.end - i.start)))
             .sum();
         let free = proxy_extinction(world, medium, Some(x)) * fm::exp(-depth);
-        let tau = world.transmittance(origin, dir, part, &mut self.rng, &mut self.counters);
+        let tau =
+            world.transmittance(&Ray::new(origin, dir), part, &mut self.rng, &mut self.counters);
         Some(Flown {
             vertex: Vertex { x, medium: Some(medium), kind: Kind::Volume(None) },
             coefficients: world.coefficients(medium, x, dir),

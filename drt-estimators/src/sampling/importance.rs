@@ -7,7 +7,7 @@
 
 use alloc::vec::Vec;
 
-use drt_math::{Rgb, Vec3};
+use drt_math::{Ray, Rgb, Vec3};
 
 use crate::model::sensor::Sensor;
 use crate::sampling::flight::{Flown, medium_span};
@@ -140,7 +140,12 @@ impl Tracer<'_> {
         if !world.connect(v, wo, distance, None, &mut self.shadow, &mut self.counters) {
             return;
         }
-        let tau = world.transmittance(v.x, wo, &self.shadow, &mut self.rng, &mut self.counters);
+        let tau = world.transmittance(
+            &Ray::new(v.x, wo),
+            &self.shadow,
+            &mut self.rng,
+            &mut self.counters,
+        );
         let value = value * tau * transport;
         let pixel = camera.view(v.x).pixel;
         let width = camera.film()[0];

@@ -1,6 +1,6 @@
 //! The one random walk, in either [`TransportMode`]: connect, scatter, follow a ray, arrive.
 
-use drt_math::{Rgb, Vec3};
+use drt_math::{Ray, Rgb, Vec3};
 use drt_medium::Coefficients;
 
 use crate::sampling::flight::{Flown, Travel, medium_span};
@@ -307,7 +307,7 @@ impl Tracer<'_> {
             if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
                 return;
             }
-            world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters)
+            world.transmittance(&Ray::new(v.x, w), &self.shadow, &mut self.rng, &mut self.counters)
         };
         let transport = tau * (weight * light.inv_pdf * self.connected);
         if transport.is_zero() {
@@ -329,7 +329,8 @@ impl Tracer<'_> {
         if part.is_zero() {
             return None;
         }
-        let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
+        let tau =
+            world.transmittance(&Ray::new(v.x, w), &self.shadow, &mut self.rng, &mut self.counters);
         Some(tau * part)
     }
 }

@@ -319,11 +319,10 @@ impl World {
         true
     }
 
-    /// Transmittance along a ray that [`World::connect`] or [`World::cast`] has followed.
+    /// Transmittance along a ray that [`World::connect`] or [`World::cast`] has followed. It ends where its path does.
     pub(crate) fn transmittance(
         &self,
-        origin: Vec3,
-        dir: Vec3,
+        ray: &Ray,
         path: &RayPath,
         rng: &mut Rng,
         counters: &mut Counters,
@@ -335,7 +334,7 @@ impl World {
         for i in intervals(path.medium, &path.crossings, path.length) {
             if let Some(m) = i.medium {
                 let mut stats = TrackingStats::default();
-                let part = Ray::new(origin + dir * i.start, dir).until(i.end - i.start);
+                let part = Ray::new(ray.at(i.start), ray.dir).until(i.end - i.start);
                 tau *= self.medium(m).transmittance(&part, rng, &mut stats);
                 counters.tracking_steps += stats.lookups;
                 if tau.is_zero() {

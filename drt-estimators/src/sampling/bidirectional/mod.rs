@@ -63,7 +63,7 @@ mod tests;
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 
-use drt_math::{Real, Rgb, Vec3};
+use drt_math::{Ray, Real, Rgb, Vec3};
 
 use crate::model::sensor::{Sensor, ViewSample};
 use crate::model::surface::Given;
@@ -467,7 +467,7 @@ impl Tracer<'_> {
         if !world.connect(from, dir, distance, target, shadow, counters) {
             return None;
         }
-        let passed = world.transmittance(from.x, dir, shadow, rng, counters);
+        let passed = world.transmittance(&Ray::new(from.x, dir), shadow, rng, counters);
         let attenuation = proxy_attenuation(world, shadow.medium, &shadow.crossings, distance);
         (!passed.is_zero()).then_some((passed, attenuation))
     }

@@ -31,7 +31,7 @@ pub(crate) mod shadow;
 
 use alloc::vec::Vec;
 
-use drt_math::{Rgb, Vec3};
+use drt_math::{Ray, Rgb, Vec3};
 
 use crate::discontinuities::collect::{Edges, collect};
 use crate::discontinuities::contact::Contact;
@@ -488,7 +488,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let Tracer { world, rng, counters, .. } = &mut *self.tracer;
         let (x, faces, medium) = (start.x, start.faces, start.medium.toward(world, start.x, w));
         let open = world.connect_past(x, faces, medium, w, distance, &mut ray, counters);
-        let tau = open.then(|| world.transmittance(x, w, &ray, rng, counters));
+        let tau = open.then(|| world.transmittance(&Ray::new(x, w), &ray, rng, counters));
         self.b.ray = ray;
         tau
     }
@@ -501,8 +501,12 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let mut tau = None;
         if ray.end.as_ref().is_some_and(|(p, _)| p.prim == target.prim) {
             let tracer = &mut *self.tracer;
-            tau =
-                Some(world.transmittance(start.x, w, &ray, &mut tracer.rng, &mut tracer.counters));
+            tau = Some(world.transmittance(
+                &Ray::new(start.x, w),
+                &ray,
+                &mut tracer.rng,
+                &mut tracer.counters,
+            ));
         }
         self.b.ray = ray;
         tau

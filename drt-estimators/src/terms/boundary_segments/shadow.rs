@@ -15,7 +15,7 @@
 
 use alloc::vec::Vec;
 
-use drt_math::{Real, Rgb, Vec3};
+use drt_math::{Ray, Real, Rgb, Vec3};
 
 use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
 use crate::discontinuities::edge::Edge;
@@ -166,7 +166,12 @@ impl Shadows {
             return None;
         }
         b.segment.truncate_from(ray, m.t);
-        let seen = world.transmittance(eye, dir, &b.segment, &mut tracer.rng, &mut tracer.counters);
+        let seen = world.transmittance(
+            &Ray::new(eye, dir),
+            &b.segment,
+            &mut tracer.rng,
+            &mut tracer.counters,
+        );
         let items = &mut b.functional.items;
         items.clear();
         items.extend(edge.velocity_terms(world, m.s, n));
@@ -225,7 +230,7 @@ impl Shadows {
         }
         b.segment.cut(distance);
         let segment = &b.segment;
-        Some(world.transmittance(x, w, segment, &mut tracer.rng, &mut tracer.counters))
+        Some(world.transmittance(&Ray::new(x, w), segment, &mut tracer.rng, &mut tracer.counters))
     }
 }
 

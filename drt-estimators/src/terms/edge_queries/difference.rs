@@ -2,7 +2,7 @@
 //! theory sheet §3).
 
 use drt_geom::edges::EdgeSides;
-use drt_math::{Rgb, Vec3};
+use drt_math::{Ray, Rgb, Vec3};
 
 use crate::derivative::velocity::blend::Blends;
 use crate::discontinuities::discontinuity_edge::DiscontinuityEdge;
@@ -84,7 +84,7 @@ impl<'a> EdgeView<'a> {
             &mut ray,
             counters,
         );
-        let tau = open.then(|| world.transmittance(self.x, self.w, &ray, rng, counters));
+        let tau = open.then(|| world.transmittance(&Ray::new(self.x, self.w), &ray, rng, counters));
         tracer.shadow = ray;
         tau.filter(|t| !t.is_zero())
     }

@@ -226,7 +226,7 @@ impl Reservoir {
             return;
         }
         let (rng, counters) = (&mut tracer.rng, &mut tracer.counters);
-        let tau = world.transmittance(m.origin, m.dir, &self.part, rng, counters);
+        let tau = world.transmittance(&Ray::new(m.origin, m.dir), &self.part, rng, counters);
         if tau.is_zero() {
             return;
         }

@@ -221,7 +221,8 @@ impl Probes {
         let distance = s.start + within;
         self.part.cut(distance);
         let m = self.part.last_medium()?;
-        let tau = world.transmittance(s.origin, s.dir, &self.part, rng, &mut tracer.counters);
+        let tau =
+            world.transmittance(&Ray::new(s.origin, s.dir), &self.part, rng, &mut tracer.counters);
         if tau.is_zero() {
             return None;
         }
