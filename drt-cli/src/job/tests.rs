@@ -304,6 +304,47 @@ fn errors_of_the_estimators_get_the_place_of_their_cause() {
     assert!(blame("q").contains("job.toml: "));
 }
 
+/// Without any of both files; messages are those of files of these names.
+#[test]
+fn jobs_and_scenes_are_decoded_from_bytes() {
+    let decoded = |text: &str, scene: Option<&str>| {
+        let scene = scene.map(|s| s.as_bytes().to_vec());
+        let overrides = Overrides { scene, ..Overrides::default() };
+        decode_job(text.as_bytes(), "open/job.toml".as_ref(), &overrides)
+    };
+    let text = "scene = \"in/room.xml\"\n[[parameter]]\nname = \"p\"\n\
+                effect = [{ target = \"cube\", translate = [1, 0, 0] }]";
+    let j = decoded(text, Some(SCENE)).unwrap();
+    assert_eq!((j.parameters.len(), j.name().as_str()), (1, "open"));
+    assert_eq!(j.scene_path, PathBuf::from("open/in/room.xml"));
+    let broken = SCENE.replace("</scene>", SMOKE);
+    for (text, scene, message) in [
+        (text, None, "open/job.toml:1:9: `scene`: cannot read open/in/room.xml: "),
+        ("scene = \"room.xml\"\nscenes = 1", Some(SCENE), "open/job.toml:2:1: "),
+        (text, Some("<scene>"), "open/in/room.xml:1:8: "),
+        (
+            text,
+            Some(&*broken),
+            "open/in/room.xml:7: <string name=\"filename\">: there is no file `g.vol`",
+        ),
+    ] {
+        let found = decoded(text, scene).unwrap_err().to_string();
+        assert!(found.starts_with(message), "{found}");
+    }
+    let no_text = decode_job(&[255], "open/job.toml".as_ref(), &Overrides::default());
+    assert_eq!(
+        no_text.unwrap_err().to_string(),
+        "open/job.toml: cannot read this file: it is not UTF-8 text"
+    );
+
+    let path = "open/room.xml".as_ref();
+    let alone = Job::decode_scene(SCENE.as_bytes(), path, &Defaults::new()).unwrap();
+    assert_eq!((alone.spp(), alone.text, alone.scene_path.as_path()), (64, None, path));
+    let unknown = Defaults::from([("m".into(), "1".into())]);
+    let error = Job::decode_scene(SCENE.as_bytes(), path, &unknown).unwrap_err();
+    assert!(error.to_string().starts_with("open/room.xml: -D m: "), "{error}");
+}
+
 #[test]
 fn a_scene_alone_brings_its_own_sample_count() {
     let folder = Folder::new();
