@@ -318,18 +318,14 @@ fn jobs_and_scenes_are_decoded_from_bytes() {
     assert_eq!((j.parameters.len(), j.name().as_str()), (1, "open"));
     assert_eq!(j.scene_path, PathBuf::from("open/in/room.xml"));
     let broken = SCENE.replace("</scene>", SMOKE);
-    for (text, scene, message) in [
-        (text, None, "open/job.toml:1:9: `scene`: cannot read open/in/room.xml: "),
-        ("scene = \"room.xml\"\nscenes = 1", Some(SCENE), "open/job.toml:2:1: "),
-        (text, Some("<scene>"), "open/in/room.xml:1:8: "),
-        (
-            text,
-            Some(&*broken),
-            "open/in/room.xml:7: <string name=\"filename\">: there is no file `g.vol`",
-        ),
+    for (text, scene, place, part) in [
+        (text, None, "open/job.toml:1:9: ", "cannot read open/in/room.xml: "),
+        ("scene = \"room.xml\"\nscenes = 1", Some(SCENE), "open/job.toml:2:1: ", "`scenes`"),
+        (text, Some("<scene>"), "open/in/room.xml:1:1: ", "never closed"),
+        (text, Some(&*broken), "open/in/room.xml:", "no file `g.vol`; searched open/in, "),
     ] {
         let found = decoded(text, scene).unwrap_err().to_string();
-        assert!(found.starts_with(message), "{found}");
+        assert!(found.starts_with(place) && found.contains(part), "{found}");
     }
     let no_text = decode_job(&[255], "open/job.toml".as_ref(), &Overrides::default());
     assert_eq!(
