@@ -230,7 +230,7 @@ fn scene_file(
 }
 
 impl Job {
-    /// A scene alone, with the number of samples its sensor asks for.
+    /// Reads a scene alone, with the number of samples that its sensor asks for.
     ///
     /// # Errors
     /// As [`read_scene`](crate::read_scene).
@@ -247,7 +247,7 @@ impl Job {
         Ok(Self::of_scene(path, defaults, scenes.read(path, defaults)?))
     }
 
-    /// As [`Job::read_scene`], from the bytes of the scene's text; `path` is as for
+    /// Reads a scene alone from the bytes of its text; `path` has the meaning that it has for
     /// [`decode_scene`](crate::decode_scene).
     ///
     /// # Errors

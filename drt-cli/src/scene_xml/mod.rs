@@ -122,7 +122,7 @@ pub fn decode_scene(bytes: &[u8], path: &Path, defaults: &Defaults) -> Result<Sc
     decode(bytes, path, defaults).map(|(scene, ..)| scene)
 }
 
-/// As [`decode_scene`], with what was passed over and the files that were read.
+/// Reads a scene as [`decode_scene`] does, with what was passed over and the files that were read.
 pub(crate) fn decode(bytes: &[u8], path: &Path, defaults: &Defaults) -> Result<Read, CliError> {
     parse_scene(path, text_of(bytes, path)?, defaults)
 }

@@ -319,7 +319,7 @@ impl World {
         true
     }
 
-    /// Transmittance along a ray that [`World::connect`] or [`World::cast`] has followed. It ends where its path does.
+    /// Transmittance along a ray that [`World::connect`] or [`World::cast`] has followed, to where `path` ends.
     pub(crate) fn transmittance(
         &self,
         ray: &Ray,
