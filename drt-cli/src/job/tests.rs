@@ -317,12 +317,13 @@ fn jobs_and_scenes_are_decoded_from_bytes() {
     let j = decoded(text, Some(SCENE)).unwrap();
     assert_eq!((j.parameters.len(), j.name().as_str()), (1, "open"));
     assert_eq!(j.scene_path, PathBuf::from("open/in/room.xml"));
-    let broken = SCENE.replace("</scene>", SMOKE);
+    let mesh = r#"<shape type="obj"><string name="filename" value="g.obj"/></shape></scene>"#;
+    let broken = SCENE.replace("</scene>", mesh);
     for (text, scene, place, part) in [
         (text, None, "open/job.toml:1:9: ", "cannot read open/in/room.xml: "),
         ("scene = \"room.xml\"\nscenes = 1", Some(SCENE), "open/job.toml:2:1: ", "`scenes`"),
         (text, Some("<scene>"), "open/in/room.xml:1:1: ", "never closed"),
-        (text, Some(&*broken), "open/in/room.xml:", "no file `g.vol`; searched open/in, "),
+        (text, Some(&*broken), "open/in/room.xml:6: ", "no file `g.obj`; searched open/in, "),
     ] {
         let found = decoded(text, scene).unwrap_err().to_string();
         assert!(found.starts_with(place) && found.contains(part), "{found}");
