@@ -20,6 +20,10 @@ fn parameters(value: f64) -> Vec<Parameter> {
     ]
 }
 
+fn colours(value: f64) -> Vec<Parameter> {
+    vec![parameter("albedo", value, vec![changes("cloud", "albedo", grey(-0.5))])]
+}
+
 /// Nothing is scattered yet: the derivative is ∫ (albedo S - L) dy with both radiances that of the sky.
 #[test]
 fn the_first_of_a_medium() {
@@ -45,6 +49,12 @@ fn the_first_of_a_medium() {
 #[test]
 fn estimators_agree_in_sparse_media() {
     judge(&sparse_cloud(), &parameters(STEP));
+}
+
+/// Where extinctions stay as they are, probes are elsewhere.
+#[test]
+fn estimators_agree_on_colours_alone() {
+    judge(&sparse_cloud(), &colours(STEP));
 }
 
 /// Light that a medium emits, and that of a lamp in it, is gathered at probes as any other is.
@@ -133,15 +143,16 @@ fn transposed(scene: &Scene, parameters: &[Parameter]) {
     }
 }
 
-/// Where nothing is empty, or only colours change, no probes are taken.
+/// Where no voxel is empty, no probes are taken.
 #[test]
 fn probes_only_where_they_help() {
     let settings = Settings::default();
     let full = full_cloud();
-    let colours = parameter("albedo", 0.0, vec![changes("cloud", "albedo", grey(-0.5))]);
+    let colours = colours(0.0).swap_remove(0);
     for (scene, p, probed) in [
         (&sparse_cloud(), parameters(0.0).swap_remove(0), true),
-        (&sparse_cloud(), colours, false),
+        (&sparse_cloud(), colours.clone(), true),
+        (&full, colours, false),
         (&full, parameters(0.0).swap_remove(0), false),
     ] {
         let found = rendered(scene, core::slice::from_ref(&p), &settings, 4);
