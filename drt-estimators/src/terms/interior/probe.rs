@@ -166,6 +166,17 @@ impl Probes {
         self.chosen = None;
     }
 
+    /// Whether the choice falls on what has this weight, which the total includes.
+    fn takes(&mut self, weight: f64) -> bool {
+        // Behind great depths nothing may be left, and none of it may be all that was offered so far.
+        if weight <= 0.0 {
+            return false;
+        }
+        let (taken, left) = divided(self.choice, weight / self.total);
+        self.choice = left;
+        taken
+    }
+
     /// Offers what is on a ray of the path.
     pub(crate) fn offer(&mut self, world: &World, leaving: &OutgoingRay, ray: &RayPath) {
         let OutgoingRay { node, throughput, dir, .. } = *leaving;
@@ -192,9 +203,7 @@ impl Probes {
                     let weight = scale * (a + b);
                     self.total += weight;
                     mean.add(m, i.start + 0.5 * (piece.start + piece.end), weight);
-                    let (taken, left) = divided(self.choice, weight / self.total);
-                    self.choice = left;
-                    if taken {
+                    if self.takes(weight) {
                         let start = i.start + piece.start;
                         let carries = leaving.carries();
                         self.chosen = Some(Stretch {
@@ -361,4 +370,32 @@ fn exponential(u: f64, rate: f64, length: f64) -> f64 {
         return u * length;
     }
     f64::min(-fm::ln_1p(u * fm::exp_m1(-depth)) / rate, length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The choice of one number is that of the weights, and what weighs nothing leaves it as it was.
+    #[test]
+    fn weights_are_chosen_in_proportion() {
+        const N: u32 = 4096;
+        let weights = [0.0, 1.0, 0.0, 2.0, 5.0];
+        let mut counts = [0; 5];
+        for unit in 0..N {
+            let mut probes = Probes::new();
+            probes.choice = sobol::sample(unit, 0, 7);
+            let mut last = None;
+            for (k, weight) in weights.into_iter().enumerate() {
+                probes.total += weight;
+                last = if probes.takes(weight) { Some(k) } else { last };
+            }
+            assert!((0.0..=1.0).contains(&probes.choice));
+            counts[last.unwrap()] += 1;
+        }
+        assert_eq!([counts[0], counts[2]], [0, 0]);
+        for (k, share) in [(1, 0.125), (3, 0.25), (4, 0.625)] {
+            assert!((f64::from(counts[k]) / f64::from(N) - share).abs() < 0.01, "{counts:?}");
+        }
+    }
 }
