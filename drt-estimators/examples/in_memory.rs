@@ -51,7 +51,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     watch.stop.store(true, Ordering::Relaxed);
     let finished = session.run(1 << 20, &watch);
-    println!("cancelled after   {} samples per pixel", session.rendering().spp);
+    println!(
+        "told to stop, it keeps the {} samples per pixel that were finished",
+        session.rendering().spp
+    );
     assert!(!finished);
     Ok(())
 }

@@ -6,6 +6,10 @@
 # $DRT names the program, where it is not `drt` in the path; further options of sbatch go into $SBATCH_EXTRA. Prints the
 # number of the last job.
 set -euo pipefail
+if [ $# -lt 4 ]; then
+    echo "usage: bash submit.sh SHARDS render|grad INPUT OUTPUT [options of drt]" >&2
+    exit 2
+fi
 here=$(cd "$(dirname "$0")" && pwd)
 count=$1 output=$4
 shift

@@ -204,7 +204,7 @@ fn media(scene: &Scene) -> Table<4> {
         }
         MediumKind::Grid(g) => {
             let [x, y, z] = g.density().size();
-            let largest = g.largest_sigma_t();
+            let largest = g.scale() * g.density().largest().max_channel();
             (format!("grid {x}x{y}x{z}"), format!("largest sigma_t {largest}"))
         }
         _ => ("custom".into(), String::new()),

@@ -52,7 +52,7 @@ pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
             let (facts, provenance) = given.facts();
             files.write(&rendering, &[], &[], &facts, &provenance)?;
             if !options.quiet {
-                summarize(&rendering, facts.seconds);
+                summarize(&rendering, facts.seconds, None);
             }
         }
         Sums::Halves { .. } | Sums::Gradient { .. } => {

@@ -119,7 +119,7 @@ impl Outputs {
         };
         Files::of(&self.options).write(rendering, further, checks, &facts, &provenance)?;
         if !self.options.changes.quiet {
-            summarize(rendering, seconds);
+            summarize(rendering, seconds, self.options.target_error);
         }
         Ok(())
     }
@@ -242,7 +242,8 @@ fn warn_of_heavy_tails(rendering: &Rendering) {
     }
 }
 
-pub(super) fn summarize(rendering: &Rendering, seconds: f64) {
+/// Says how a run ended that was to go on until its noise was below `target_error`, where one is given.
+pub(super) fn summarize(rendering: &Rendering, seconds: f64, target_error: Option<f64>) {
     let [w, h] = rendering.image.size;
     let noise = 100.0 * largest_noise(rendering);
     let complete = if rendering.complete { "" } else { ", incomplete" };
@@ -250,6 +251,12 @@ pub(super) fn summarize(rendering: &Rendering, seconds: f64) {
     console::note(format_args!(
         "{w}x{h}, {spp} spp, {seconds:.2} s, relative noise {noise:.2} %{complete}"
     ));
+    if let Some(target) = target_error.filter(|target| noise > 100.0 * target) {
+        console::note(format_args!(
+            "note: the noise is above the target error of {:.2} %: the time or the samples that were given ended first",
+            100.0 * target
+        ));
+    }
     warn_of_heavy_tails(rendering);
     if rendering.non_finite > 0 {
         let count = rendering.non_finite;

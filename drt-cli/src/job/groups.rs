@@ -174,8 +174,8 @@ fn texels(
         }
         _ => return Err("only textures of BSDFs and emitters have texels".into()),
     };
-    let property = surface::Property::from_name(name).map_err(|e| e.to_string())?;
     let bsdf = &scene.bsdfs[b].item;
+    let property = bsdf.named_property(name).map_err(|e| e.to_string())?;
     if bsdf.texels(property).is_none() {
         return Err(no_texture());
     }

@@ -52,7 +52,7 @@ fn broken_jobs_stop_no_others_and_finished_ones_are_skipped() {
     let line = format!("batch {} -o out --previews", names.join(" "));
     let out = folder.run(&line);
     let summary = "4 finished, 0 were finished before, 2 failed";
-    expect(&out, 1, &["1.toml: 1.toml:7", "4.toml: 4.toml:7", "lmap", summary]);
+    expect(&out, 1, &["error: 1.toml:7", "error: 4.toml:7", "lmap", summary]);
     for i in [0, 2, 3, 5] {
         assert_eq!(folder.json(&format!("out/{i}.json"))["command"], "grad");
         assert!(folder.exr(&format!("out/{i}.exr")).layers.contains_key("d_x"));
@@ -70,6 +70,8 @@ fn broken_jobs_stop_no_others_and_finished_ones_are_skipped() {
     expect(&folder.run(&line), 1, &["3 finished, 2 were finished before, 1 failed"]);
     folder.file("b.xml", SCENE.replace("50", "41"));
     expect(&folder.run(&line), 1, &["3 finished, 2 were finished before, 1 failed"]);
+    let missing = folder.run("batch 7.toml -o other");
+    expect(&missing, 1, &["error: 7.toml: cannot read this file"]);
     let events = events(&folder);
     assert_eq!((count(&events, "finished"), count(&events, "failed")), (10, 4));
 }

@@ -103,6 +103,12 @@ fn shapes_and_textures_are_fitted_beside_parameters() {
     // It has grown where the camera sees it.
     let radius = mesh.positions.iter().map(|p| p.length()).fold(0.0, f64::max);
     assert!(radius > 0.54, "{radius}");
+    // The page has each group's row and curve beside those of the parameter.
+    let page = String::from_utf8(bytes(&folder, "report.html")).unwrap();
+    for part in ["<td>power</td>", "<td>paint</td><td>192</td><td>8 × 8 × 3</td>", "body: change"]
+    {
+        assert!(page.contains(part), "{part}");
+    }
     // What came out can be rendered again.
     std::fs::copy(folder.path().join("run/paint.exr"), folder.path().join("texels.exr")).unwrap();
     let ball = r#"type="obj" id="ball"><string name="filename" value="ball.obj"/>"#;
@@ -173,6 +179,12 @@ fn views_in_known_poses() {
     let whole = losses(job(1.0), &["--restart"]);
     assert!(whole.len() == 13 && whole[12] < 0.6 * whole[0], "{whole:?}");
     let body = bytes(&folder, "body.ply");
+    // The page has no section about parameters, of which there are none.
+    let page = String::from_utf8(bytes(&folder, "report.html")).unwrap();
+    assert!(page.contains("<h2>Groups</h2>") && page.contains("body: change"));
+    for absent in ["<h2>Parameters</h2>", "<h2>Derivatives</h2>", "red bar"] {
+        assert!(!page.contains(absent), "{absent}");
+    }
     // A run that was stopped goes on with the views that were next.
     let parts = losses(job(1.0), &["--restart --seconds 0.01", "--threads 1"]);
     assert!(parts == whole, "{parts:?} {whole:?}");

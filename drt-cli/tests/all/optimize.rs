@@ -84,7 +84,10 @@ fn a_fit_arrives_and_tells_of_it() {
     // Once there, it stays there.
     let state = || (text(&folder, "run/params.csv"), folder.json("run/checkpoint.json"));
     let before = state();
-    expect(&folder.run("optimize job.toml --quiet"), 0, &[]);
+    let again = folder.run("optimize job.toml");
+    expect(&again, 0, &[]);
+    let said = String::from_utf8_lossy(&again.stdout);
+    assert!(said.contains("it was finished before"), "{said}");
     assert_eq!(before, state(), "times included");
     // What begins anew leaves nothing of what was.
     folder.file("run/frame-notes.png", "mine");

@@ -438,9 +438,9 @@ impl Apply<'_> {
                 return Err(self.fail(p, target, EffectError::NoVoxels));
             }
             let theta = parameter.value;
-            let property = Property::from_name(&c.property).map_err(|e| self.fail(p, target, e))?;
-            let change = BsdfChange { property, op: c.op };
             let bsdf = &self.scene.bsdfs[i].item;
+            let property = bsdf.named_property(&c.property).map_err(|e| self.fail(p, target, e))?;
+            let change = BsdfChange { property, op: c.op };
             let refused = bsdf.undifferentiated(property).map(|reason| {
                 let bsdf = bsdf.name();
                 self.fail(p, target, SurfaceError::NotDifferentiated { bsdf, property, reason })

@@ -18,3 +18,9 @@ pub(crate) const DIMENSIONS: u32 = SET_DIMENSIONS;
 pub(crate) fn sequence_name(seed: u64, pixel: u32, number: u32) -> u32 {
     Rng::new(seed, SEQUENCE_STREAM | u64::from(pixel), number).next_u32()
 }
+
+/// The names of the two Sobol' sequences of the probes of a pixel.
+pub(crate) fn names_of_probes(seed: u64, pixel: u32) -> [u32; 2] {
+    let mut names = Rng::new(seed, SEQUENCE_STREAM | PROBE_STREAM | u64::from(pixel), 0);
+    [names.next_u32(), names.next_u32()]
+}

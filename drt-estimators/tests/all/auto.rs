@@ -53,7 +53,8 @@ fn what_is_chosen_is_the_named_estimator() {
     let (scene, parameters) = (room(), camera_moves());
     let chosen = run(&scene, &parameters, &settings(EstimatorKind::Auto));
     let why = chosen.plan.estimator.clone().unwrap();
-    let (name, works) = why.split_once(": in a pilot").unwrap();
+    let (name, works) =
+        why.split_once(": a pilot measured the work of each, with the least as 1: ").unwrap();
     // `path-space` stays where little more than noise tells it from another one, and no other is chosen without the least work.
     let work_of = |name: &str| -> f64 {
         let (_, after) = works.split_once(&format!("{name} ")).unwrap();

@@ -5,6 +5,7 @@ mod auto;
 mod bidirectional;
 mod check;
 mod common;
+mod contacts;
 mod determinism;
 mod environment;
 mod every_vertex;

@@ -31,6 +31,17 @@ impl fmt::Display for Entry {
 }
 
 impl Entry {
+    /// A message about the job, which names it once.
+    pub(super) fn blamed_for(&self, message: &str) -> String {
+        let name = self.options.input.display().to_string();
+        match message.strip_prefix(&name).and_then(|rest| rest.strip_prefix(':')) {
+            Some(rest) if rest.starts_with(' ') => format!("{self}:{rest}"),
+            // A place in the file follows its name.
+            Some(_) if self.place.is_none() => message.to_owned(),
+            _ => format!("{self}: {message}"),
+        }
+    }
+
     /// Where its image goes.
     pub(super) fn output(&self) -> &Path {
         self.options.output.as_deref().unwrap_or(Path::new(""))

@@ -91,7 +91,7 @@ struct Tally {
 impl Tally {
     fn tell(&self, entries: &[Entry], quiet: bool) {
         for (i, error) in &self.failed {
-            let message = shown(&format!("{}: {error}", entries[*i]));
+            let message = shown(&entries[*i].blamed_for(&error.to_string()));
             console::note(format_args!("drt: error: {message}"));
         }
         if !quiet {

@@ -134,6 +134,11 @@ impl<'a> Descent<'a> {
         self.problem.plan.checkpoint.as_deref().filter(|_| self.team.leads())
     }
 
+    /// True where an earlier run took all steps.
+    pub(super) fn was_finished(&self) -> bool {
+        self.again
+    }
+
     /// Steps taken.
     pub(super) fn steps(&self) -> u32 {
         self.optimizer.state().steps as u32

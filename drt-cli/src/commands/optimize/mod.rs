@@ -159,6 +159,9 @@ fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluatio
     if let Some(folder) = &problem.plan.checkpoint {
         text += &format!("results and report.html are in {}\n", folder.display());
     }
+    if descent.was_finished() {
+        text += "it was finished before, so that nothing was left to do; --restart begins anew\n";
+    }
     if descent.steps() < problem.iterations {
         let (steps, n) = (descent.steps(), problem.iterations);
         text += &match &problem.plan.checkpoint {

@@ -183,8 +183,8 @@ pub enum SurfaceError {
     NoSuchProperty {
         /// Kind of BSDF, by its plugin name.
         bsdf: &'static str,
-        /// The property asked for.
-        property: Property,
+        /// The name of the property asked for.
+        property: String,
         /// The names of those it has, or `nothing that can change`.
         available: String,
     },

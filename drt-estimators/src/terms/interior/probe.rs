@@ -79,7 +79,7 @@ use drt_math::sobol::{self, SobolSampler};
 use drt_math::{Ray, Rgb, Rng, Vec3, fm};
 use drt_medium::Piece;
 
-use crate::sampling::streams::{PROBE_STREAM, SEQUENCE_STREAM};
+use crate::sampling::streams::{PROBE_STREAM, names_of_probes};
 use crate::sampling::trace::{Arrival, Endpoint, OutgoingRay, Tracer};
 use crate::world::lights::Environment;
 use crate::world::vertex::{Kind, Vertex};
@@ -126,10 +126,11 @@ pub(crate) struct Probe {
 #[derive(Clone, Debug)]
 pub(crate) struct Probes {
     rng: Rng,
-    /// The path's number among those of its pixel.
+    /// The path's pixel, and its number among those of the pixel.
+    pixel: Option<u32>,
     unit: u32,
-    /// Names the sequence of the numbers of what probes see.
-    sequence: u32,
+    /// Names the pixel's sequences of the choice of probes, and of the numbers of what they see.
+    names: [u32; 2],
     /// Uniform in what is left of the choice among the stretches so far.
     choice: f64,
     total: f64,
@@ -144,8 +145,9 @@ impl Probes {
     pub(crate) fn new() -> Self {
         Self {
             rng: Rng::new(0, 0, 0),
+            pixel: None,
             unit: 0,
-            sequence: 0,
+            names: [0; 2],
             choice: 0.5,
             total: 0.0,
             chosen: None,
@@ -154,14 +156,15 @@ impl Probes {
         }
     }
 
-    /// Forgets the last path; the next is sample `unit` of a pixel.
+    /// Forgets the last path; the next is sample `unit` of a pixel. All paths are of one `seed`.
     pub(crate) fn begin(&mut self, seed: u64, pixel: u32, unit: u32) {
-        let stream = PROBE_STREAM | u64::from(pixel);
-        self.rng = Rng::new(seed, stream, unit);
+        if self.pixel != Some(pixel) {
+            self.pixel = Some(pixel);
+            self.names = names_of_probes(seed, pixel);
+        }
+        self.rng = Rng::new(seed, PROBE_STREAM | u64::from(pixel), unit);
         self.unit = unit;
-        let mut names = Rng::new(seed, SEQUENCE_STREAM | stream, 0);
-        self.choice = sobol::sample(unit, 0, names.next_u32());
-        self.sequence = names.next_u32();
+        self.choice = sobol::sample(unit, 0, self.names[0]);
         self.total = 0.0;
         self.chosen = None;
     }
@@ -291,7 +294,7 @@ impl Probes {
 
     /// What leads the numbers of path `k` of those that see it.
     pub(crate) fn leading(&self, k: u32) -> SobolSampler {
-        SobolSampler::new(self.sequence, self.unit.wrapping_mul(SPLIT).wrapping_add(k))
+        SobolSampler::new(self.names[1], self.unit.wrapping_mul(SPLIT).wrapping_add(k))
     }
 }
 

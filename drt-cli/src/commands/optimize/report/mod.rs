@@ -64,8 +64,10 @@ impl Report<'_> {
             page += &format!("<p>{}</p>\n", escaped(note));
         }
         page += &self.parameters();
+        page += &self.groups();
         page += &self.curves();
         page += &self.images();
+        page += &self.derivatives();
         page += &self.times();
         if let Some(text) = &self.problem.job.text {
             page += &format!(
@@ -86,13 +88,19 @@ impl Report<'_> {
         format!("{} of {n} iterations{loss}. Written by {PROGRAM}.", self.steps)
     }
 
+    fn has_parameters(&self) -> bool {
+        !self.problem.job.parameters.is_empty()
+    }
+
     fn parameters(&self) -> String {
         let mut text = String::from(
             "<h2>Parameters</h2>\n<table><tr><th>parameter</th><th>start</th><th>now</th>\
              <th>±</th><th>left</th><th>learning rate</th><th>bounds</th></tr>\n",
         );
         let rows = self.history.values.first().zip(self.history.values.last());
-        let Some((start, now)) = rows else { return String::new() };
+        let Some((start, now)) = rows.filter(|_| self.has_parameters()) else {
+            return String::new();
+        };
         for (p, name) in self.problem.names().enumerate() {
             let variable = &self.problem.plan.variables[p];
             let logarithmic = if variable.logarithmic { " (of the logarithm)" } else { "" };
@@ -134,16 +142,45 @@ impl Report<'_> {
         )
     }
 
+    /// How many unknowns each group has, and how far they have gone.
+    fn groups(&self) -> String {
+        let job = self.problem.job;
+        let Some(now) = self.history.values.last().filter(|_| !job.groups.is_empty()) else {
+            return String::new();
+        };
+        let mut text = String::from(
+            "<h2>Groups</h2>\n<table><tr><th>group</th><th>values</th><th>shape</th>\
+             <th>root mean square change</th></tr>\n",
+        );
+        for (group, change) in job.groups.iter().zip(&now[job.parameters.len()..]) {
+            let shape = group.group.shape(&job.scene);
+            let count: usize = shape.iter().product();
+            let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "<tr><td>{}</td><td>{count}</td><td>{}</td><td>{change:.4e}</td></tr>",
+                escaped(&group.group.name),
+                shape.join(" × ")
+            );
+        }
+        text + "</table>\n"
+    }
+
     fn curves(&self) -> String {
         let loss =
             Chart { title: "loss", values: &self.history.losses, logarithmic: true, error: None };
         let mut text = format!("<h2>Curves</h2>\n<div class=\"row\">\n{}", loss.svg());
-        for (p, name) in self.problem.names().enumerate().take(MOST_SHOWN) {
+        let parameters = self.problem.job.parameters.len();
+        let shown = |p: &usize| *p < usize::min(parameters, MOST_SHOWN) || *p >= parameters;
+        for (p, name) in self.problem.columns().enumerate().filter(|(p, _)| shown(p)) {
             let values: Vec<f64> = self.history.values.iter().map(|row| row[p]).collect();
-            let error = self.outlook.as_ref().map(|known| known.errors[p]);
-            text += &Chart { title: name, values: &values, logarithmic: false, error }.svg();
+            let error = self.outlook.as_ref().and_then(|known| known.errors.get(p).copied());
+            let title = if p < parameters { name } else { &format!("{name}: change") };
+            text += &Chart { title, values: &values, logarithmic: false, error }.svg();
         }
-        text + "</div>\n<p>Over iterations; the red bar is ±.</p>\n"
+        let bars = if self.has_parameters() { "; the red bar is ±" } else { "" };
+        format!("{text}</div>\n<p>Over iterations{bars}.</p>\n")
     }
 
     fn images(&self) -> String {
@@ -166,7 +203,14 @@ impl Report<'_> {
             text +=
                 &figure(&self.gallery.shape(name), &format!("{name}: the start above, now below"));
         }
-        text += "<h2>Derivatives</h2>\n";
+        text
+    }
+
+    fn derivatives(&self) -> String {
+        if !self.has_parameters() {
+            return String::new();
+        }
+        let mut text = String::from("<h2>Derivatives</h2>\n");
         for v in 0..self.problem.views.len() {
             text += "<div class=\"row\">\n";
             for (p, name) in self.problem.names().enumerate().take(MOST_SHOWN) {

@@ -108,7 +108,7 @@ impl Bsdf {
     ) -> Result<(), SurfaceError> {
         match self.property(property) {
             Some(slot) => slot.set(value),
-            None => return Err(self.lacks(property)),
+            None => return Err(self.lacks(property.name())),
         }
         Ok(())
     }
@@ -129,13 +129,21 @@ impl Bsdf {
         self.clone().property(property).map(|slot| matches!(slot, Slot::Scalar(_)))
     }
 
-    fn lacks(&mut self, property: Property) -> SurfaceError {
+    /// The property of a name that a change of this BSDF gives.
+    ///
+    /// # Errors
+    /// [`SurfaceError::NoSuchProperty`] where no BSDF has one of this name, with the names of those that this one has.
+    pub fn named_property(&self, name: &str) -> Result<Property, SurfaceError> {
+        Property::from_name(name).map_err(|_| self.clone().lacks(name))
+    }
+
+    fn lacks(&mut self, property: &str) -> SurfaceError {
         let mut available =
             names(Property::ALL.into_iter().filter(|&p| self.property(p).is_some()));
         if available.is_empty() {
             available.push_str("nothing that can change");
         }
-        SurfaceError::NoSuchProperty { bsdf: self.name(), property, available }
+        SurfaceError::NoSuchProperty { bsdf: self.name(), property: property.into(), available }
     }
 
     fn slot(&mut self, change: &BsdfChange) -> Result<Slot<'_>, SurfaceError> {
@@ -146,7 +154,7 @@ impl Bsdf {
         if self.texture(property).is_some() {
             return Err(SurfaceError::StoodFor { property });
         }
-        let lacks = self.lacks(property);
+        let lacks = self.lacks(property.name());
         let slot = self.property(property).ok_or(lacks)?;
         match (&slot, change.op) {
             (Slot::Scalar(_), ValueChange::Add(a)) if !change.op.is_scalar() => {

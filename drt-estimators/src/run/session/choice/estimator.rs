@@ -82,10 +82,13 @@ pub(crate) fn estimator(ground: &Ground<'_>, kept: &mut PreparedCache) -> Result
             let compared = compared.join(", ");
             let best = best(several, &works);
             let kept = match several[best].kind == USUAL && works[best].ratio > 1.0 {
-                true => "; it is the usual one, and no other is sure to need much less",
+                true => "; path-space is kept, since none is clearly better",
                 false => "",
             };
-            (best, format!("in a pilot the work was, over the least of all, {compared}{kept}"))
+            (
+                best,
+                format!("a pilot measured the work of each, with the least as 1: {compared}{kept}"),
+            )
         }
     };
     let Candidate { kind, prepared: preparation, .. } = candidates.swap_remove(best);

@@ -1,0 +1,76 @@
+//! A box that slides over the floor that it stands on, or leaves it: the velocities of both surfaces differ right up to the line where they
+//! touch, so that samples of the default velocity of vertices grow like one over the distance from it.
+
+use crate::common::*;
+use drt_estimators::{
+    EstimatorKind, Rendering, Scene, SceneBuilder, Settings, ShapeBuilder, Tail, Unattended,
+    agreement, finite_differences,
+};
+use drt_geom::procedural;
+use drt_math::{Rgb, Vec3, vec3};
+use drt_motion::{GeometryChange, Parameter};
+
+/// A box that stands on a floor under a lamp.
+fn box_on_floor() -> Scene {
+    let block = procedural::cube().transform(&scaled(0.5, vec3(0.0, -0.5, 0.0)));
+    let scene = SceneBuilder::new()
+        .shape("box", ShapeBuilder::new(block, diffuse(0.8, 0.8, 0.8)))
+        .shape("floor", ShapeBuilder::new(floor(), diffuse(0.8, 0.8, 0.8)))
+        .shape("lamp", glowing(lamp(), Rgb::splat(5.0)));
+    let mut scene = seen(scene, [vec3(0.4, 1.5, 5.0), vec3(0.0, -0.6, 0.0)], 5);
+    let sensor = &mut scene.sensors[0].item.sensor;
+    *sensor = sensor.with_film([64, 64]).unwrap();
+    scene
+}
+
+fn slides() -> Parameter {
+    parameter("slides", 0.0, vec![moves("box", GeometryChange::Translate(Vec3::X))])
+}
+
+fn leaves() -> Parameter {
+    parameter("leaves", 0.0, vec![moves("box", GeometryChange::Translate(Vec3::Y))])
+}
+
+fn by(estimator: EstimatorKind, seed: u64, spp: u32, parameters: &[Parameter]) -> Rendering {
+    let settings = Settings { estimator, seed, expected_spp: 1 << 10, ..Settings::default() };
+    rendered(&box_on_floor(), parameters, &settings, spp)
+}
+
+#[test]
+fn what_is_chosen_where_bodies_slide_or_part() {
+    for parameter in [slides(), leaves()] {
+        let chosen = by(EstimatorKind::Auto, 1, 16, &[parameter]);
+        let why = chosen.plan.estimator.unwrap();
+        assert!(why.starts_with("radiative: "), "{why}");
+    }
+}
+
+#[test]
+fn error_bars_hold_or_are_said_to_be_too_small() {
+    let both = [slides(), leaves()];
+    let known = by(EstimatorKind::Radiative, 1, 256, &both);
+    let settings = Settings { seed: 3, ..Settings::default() };
+    let (scene, slides) = (box_on_floor(), &both[..1]);
+    let differences = finite_differences(&scene, slides, &settings, 512, 0.004, &Unattended);
+    let (slope, difference) = (&known.derivatives[0].total, &differences.unwrap()[0]);
+    let found = agreement(slope, difference, None);
+    assert!(found.agrees, "{found:?}");
+    // As if half of it were missing.
+    let half = agreement(&multiple(slope, 0.5), difference, None);
+    assert!(!half.agrees, "{half:?}");
+
+    let mut heavy = 0;
+    for seed in 0..24 {
+        let default = by(EstimatorKind::PathSpace, seed, 32, &both);
+        for (d, known) in default.derivatives.iter().zip(&known.derivatives) {
+            let ([value, error], [known, other]) = (sum(&d.total), sum(&known.total));
+            let off = (value - known).abs() / error.hypot(other);
+            let told = d.total.tail.share() > Tail::HEAVY;
+            heavy += u32::from(told);
+            let name = &d.name;
+            assert!(told || off < 4.0, "{name}: {value} ± {error}, {known} ± {other}");
+        }
+    }
+    println!("{heavy} of 48 have a heavy tail");
+    assert!(heavy > 0);
+}
