@@ -7,13 +7,14 @@ use crate::common::pairing::{pair, targets};
 use crate::common::*;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::{Filter, FilterKind};
+use drt_estimators::fit::{Group, GroupKind};
 use drt_estimators::sensor::{Aperture, Lens, Sensor};
 use drt_estimators::surface::{
     Anisotropic, Bsdf, Conductor, Dielectric, Mask, Measured, MeasuredTables, Principled,
     RoughConductor,
 };
 use drt_estimators::{
-    EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Shape, Unattended,
+    EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Shape, Unattended, moved,
 };
 use drt_geom::procedural;
 use drt_math::{Rgb, Rng, ValueChange, Vec3, vec3};
@@ -153,6 +154,79 @@ fn surfaces_everything_at_once() {
         changes("camera", "fov", grey(3.0)),
     ]);
     agree("everything", &scene, effects, &settings());
+}
+
+/// Both sides for a change of a body along a direction of the group's values, in a pose that is known, and the size of the summands; then
+/// the right one as if the pose were not known.
+fn sides_in_a_pose(
+    scene: &Scene,
+    group: &Group,
+    along: GeometryChange,
+    direction: &[f64],
+    settings: &Settings,
+) -> [f64; 4] {
+    let turn = GeometryChange::Rotate { axis: vec3(0.3, 1.0, -0.2), pivot: vec3(0.1, 0.1, 0.0) };
+    let changes = [
+        parameter("along", 0.0, vec![moves("ball", along)]),
+        parameter("pose", 0.7, vec![moves("ball", turn)]),
+    ];
+    let a = adjoint(scene);
+    let mut session = Session::new(scene, &changes, settings).expect("a valid scene");
+    assert!(session.run(SPP, &Unattended));
+    let along = &session.rendering().derivatives[0].total;
+    let products: Vec<Rgb> = along.pixels.iter().zip(&a).map(|(p, a)| p.mean * *a).collect();
+    let found = session.gradient(&[group.wanted()], SPP, &a, &Unattended).expect("a valid scene");
+    let posed = moved(scene, &changes).expect("a valid scene");
+    let reverse = |changes: &[Parameter]| -> f64 {
+        let collector = group.collector(scene, &posed, changes).expect("a group of it");
+        let mut numbers = vec![0.0; group.count(scene)];
+        collector.add_to(&found, 1.0, &mut numbers);
+        numbers.iter().zip(direction).map(|(g, d)| g * d).sum()
+    };
+    [
+        products.iter().map(|p| p.sum()).sum(),
+        reverse(&changes),
+        products.iter().map(|p| p.abs().sum()).sum(),
+        reverse(&changes[..1]),
+    ]
+}
+
+/// Gradients by a body's vertices and by those of a cage around it go back through the pose in which a view shows the body.
+#[test]
+fn groups_in_a_pose() {
+    let scene = surfaces(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6));
+    let mut rng = Rng::new(5, 0, 0);
+    let mut random = |_| vec3(rng.next_f64(), rng.next_f64(), rng.next_f64()) - Vec3::splat(0.5);
+    let velocities: Vec<Vec3> = scene.shapes[0].mesh.positions.iter().map(&mut random).collect();
+    let cage = Arc::new(procedural::cube().transform(&scaled(1.3, vec3(0.1, 0.1, 0.0))));
+    let corners: Vec<Vec3> = cage.positions.iter().map(&mut random).collect();
+    let vertices = (0..).zip(corners.iter().copied()).collect();
+    let group = |kind| Group::new("body", &scene, &"ball", kind).expect("a shape");
+    let trials = [
+        (
+            group(GroupKind::Vertices),
+            GeometryChange::VertexVelocity(velocities.clone().into()),
+            velocities,
+        ),
+        (
+            group(GroupKind::Cage(cage.clone())),
+            GeometryChange::Cage { mesh: cage, vertices },
+            corners,
+        ),
+    ];
+    for (group, along, direction) in trials {
+        let direction: Vec<f64> = direction.iter().flat_map(|v| v.to_array()).collect();
+        for estimator in [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped]
+        {
+            let settings = Settings { estimator, ..settings() };
+            let settings = Settings { insides: Vec::new(), ..settings };
+            let [forward, reverse, size, still] =
+                sides_in_a_pose(&scene, &group, along.clone(), &direction, &settings);
+            let [off, planted] = [reverse, still].map(|r| (forward - r).abs() / size);
+            assert!(size > 1e-3 && off < 1e-9, "{estimator:?}: off by {off:e} of {size}");
+            assert!(planted > 1e-3, "{estimator:?}: {planted:e}");
+        }
+    }
 }
 
 /// Lines where surfaces pass through each other move with both of them.
