@@ -106,4 +106,9 @@ fn texels_that_are_not_there_are_refused() {
         &format!("{group}{}", eta.replace("texels = \"all\"", "")),
         &["no texture stands for `eta`"],
     );
+    // What this BSDF has is told, and not what all of them have.
+    let gloss = "target = \"wall\"\nproperty = \"gloss\"\n";
+    let parts = ["BSDF has no \"gloss\"; it has: ", "specular_reflectance"];
+    refused(&effect(gloss), &parts);
+    refused(&format!("{group}{gloss}"), &parts);
 }
