@@ -30,18 +30,26 @@ impl Differentiator<'_> {
     ) -> bool {
         let RecordedPath { record, velocities, .. } = *recorded;
         let (world, field) = (self.world, velocities.field());
-        let turns = velocities.of(k).turn.is_some() && !self.edges_at_rest;
-        if !turns || emitted.is_zero() || !field.emission_turns_apart(point) {
+        if self.edges_at_rest || emitted.is_zero() || !field.emission_turns_apart(point) {
             return false;
         }
         let eye = world.eye_at(record.origin);
         let Some(arrival) = record.nodes[k].arrival.as_ref() else { return false };
+        // Past a smooth surface it is the chain's first ray that turns.
+        if record.nodes[arrival.parent as usize].single {
+            return false;
+        }
         let ray = found_ray(recorded, arrival, &eye, point);
         let ray = TurningRay { emission_alone: true, ..ray };
         let mut parts = core::mem::take(&mut self.parts);
         parts.clear();
         let turn = field.turn(world, &ray, &mut self.probe, &mut parts);
         self.probe.turning_edges += parts.len() as u64;
+        // Edges that turn the ray for one of both may be too far behind the surface for the other.
+        if turn.is_none() && velocities.of(k).turn.is_none() {
+            self.parts = parts;
+            return false;
+        }
         let found = Found {
             camera_ray: record.camera_ray,
             viewer: record.nodes[arrival.parent as usize].vertex(),

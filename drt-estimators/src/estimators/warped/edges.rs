@@ -31,6 +31,8 @@ pub(super) struct TurningEdges {
     emits_alike: Vec<bool>,
     /// Shapes at whose creases light does not jump.
     untracked: Vec<bool>,
+    /// Shapes with creases at which nothing that they scatter jumps, as seen from their front and from their back.
+    even: Vec<[bool; 2]>,
     /// The gradients of the normals of smooth shapes at their vertices, where they are interpolated.
     normal_slopes: Vec<Vec<Mat3>>,
     /// To look these up.
@@ -71,6 +73,14 @@ impl TurningEdges {
             *alike.get_or_insert_with(|| world.emits_evenly(shape)) &=
                 edges.faces_one_way(world, edge);
         }
+        let mut even = alloc::vec![[false; 2]; shapes.len()];
+        for (edge, turning) in edges.list.iter().zip(&list) {
+            let Some(shape) = edges.shape_of_faces(world, edge) else { continue };
+            let sides = &mut even[shape as usize];
+            for (even, discontinuous) in sides.iter_mut().zip(turning.jumps()) {
+                *even |= !discontinuous;
+            }
+        }
         let emits_alike = emits_alike.into_iter().map(|alike| alike.unwrap_or(false)).collect();
         let untracked = (0..shapes.len() as u32).map(|s| is_untracked(world, s)).collect();
         let slopes = |shape: &Shape| {
@@ -82,7 +92,7 @@ impl TurningEdges {
         };
         let normal_slopes = shapes.iter().map(slopes).collect();
         let scene = Some(Arc::clone(&world.scene));
-        Self { list, all, moving, faceted, emits_alike, untracked, normal_slopes, scene }
+        Self { list, all, moving, faceted, emits_alike, untracked, even, normal_slopes, scene }
     }
 
     /// True of a ray that ends on a shape at whose creases what it emits does not jump, though what it scatters may.
@@ -109,7 +119,11 @@ impl TurningEdges {
         };
         let creases_of = ray.end.filter(|s| !alike(s)).map(|s| s.shape);
         let facets = creases_of.is_some_and(|shape| self.faceted[shape as usize]);
-        Near::of_ray(ray, angle, creases_of, facets)
+        // Without the weight of a crease, nothing may jump there with the planes of facets.
+        let even =
+            |s: &SurfacePoint| self.even[s.shape as usize][usize::from(s.ng.dot(ray.dir) > 0.0)];
+        let by_length = ray.end.is_some_and(|s| alike(s) || even(s));
+        Near::of_ray(ray, angle, creases_of, by_length, facets)
     }
 
     /// True when something moves.

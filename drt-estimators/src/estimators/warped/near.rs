@@ -51,11 +51,12 @@ pub(super) struct Near {
 
 impl Near {
     /// Prepares the weights of edges beside a ray. `creases_of` is the shape where it ends, if radiance may jump at creases of that; `facets` tells that this is a
-    /// curved one.
+    /// curved one. With `by_length` it counts how far an edge is beyond the end of the ray, and not how far behind the plane there.
     pub(super) fn of_ray(
         ray: &TurningRay<'_>,
         angle: f64,
         creases_of: Option<u32>,
+        by_length: bool,
         facets: bool,
     ) -> Self {
         let TurningRay { viewer, dir, distance, end, of_camera, .. } = *ray;
@@ -79,7 +80,7 @@ impl Near {
             normal,
             // At creases that do not count, what is behind must not jump with the plane.
             tangent_plane: ray.tangent_plane,
-            length: end.filter(|_| creases_of.is_none()).map(|_| {
+            length: end.filter(|_| by_length).map(|_| {
                 let gradient = normal.reject(dir) * (-distance / normal.dot(dir));
                 Weight { value: distance, gradient }
             }),

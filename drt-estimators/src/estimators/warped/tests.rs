@@ -7,7 +7,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::procedural;
-use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
+use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
 use drt_motion::{GeometryChange, Parameter};
 
 use crate::derivative::contraction::Motion;
@@ -263,6 +263,69 @@ fn lamps_of_facets() {
     for bsdf in [diffuse(0.0, 0.0, 0.0), diffuse(0.8, 0.9, 0.7)] {
         compare(&glowing_ball(bsdf), &motion, sum, &[Fault::Sign, Fault::Weight]);
     }
+}
+
+/// The rate of rays from many places to a lamp does not jump at its creases, whether its light does or not: what is scattered on the way
+/// there sees the rate.
+#[test]
+fn rates_do_not_jump_at_creases() {
+    let motion = parameter("camera", 0.0, alloc::vec![moves("camera", shift())]);
+    let mut seen = 0;
+    for (bsdf, emission_alone) in [
+        (diffuse(0.8, 0.9, 0.7), false),
+        (diffuse(0.8, 0.9, 0.7), true),
+        (diffuse(0.0, 0.0, 0.0), false),
+        (diffuse(0.0, 0.0, 0.0), true),
+    ] {
+        let lit = EmitterMask::Extended;
+        let scene = glowing_ball(bsdf);
+        let (prepared, _) = prepare_lit(EstimatorKind::Warped, lit, &scene, &motion, 4);
+        let (world, field) = (&prepared.world, &prepared.terms.velocity);
+        let triangles = &world.scene.shapes[0].mesh.triangles;
+        let mut probe = Probe::new(Rng::new(0, 0, 0));
+        let mut weight = |triangle: u32, edge: [u32; 2], eye: Vec3| {
+            let corners = triangles[triangle as usize];
+            let half = |v: u32| if edge.contains(&v) { 0.5 } else { 0.0 };
+            let (end, x) = world.point(triangle, [half(corners[1]), half(corners[2])]);
+            let (viewer, ray) =
+                (Vertex { x: eye, medium: None, kind: Kind::Volume(None) }, x - eye);
+            if end.ng.dot(ray) > -0.01 {
+                return None;
+            }
+            let ray = TurningRay {
+                viewer: &viewer,
+                moves: true,
+                of_camera: None,
+                dir: ray.normalize(),
+                distance: ray.length(),
+                end: Some(&end),
+                emission_alone,
+                tangent_plane: None,
+            };
+            let turn = field.turn(world, &ray, &mut probe, &mut Vec::new());
+            Some(turn.map_or(0.0, |turn| turn.weight))
+        };
+        for eye in [vec3(0.3, 0.9, 4.0), vec3(1.5, 0.2, 0.6), vec3(-0.4, 1.6, -0.9)] {
+            for (a, one) in (0..).zip(triangles) {
+                for (b, other) in (0..a).zip(triangles) {
+                    let shared = one.map(|v| other.contains(&v));
+                    let [Some(i), Some(k)] = [true, false].map(|first| {
+                        let mut found = (0..3).filter(|c| shared[*c]);
+                        if first { found.next() } else { found.nth(1) }
+                    }) else {
+                        continue;
+                    };
+                    let edge = [one[i], one[k]];
+                    let [Some(here), Some(there)] = [a, b].map(|t| weight(t, edge, eye)) else {
+                        continue;
+                    };
+                    seen += 1;
+                    assert!((here - there).abs() < 1e-6, "{here} {there}, {emission_alone}");
+                }
+            }
+        }
+    }
+    assert!(seen > 500, "{seen}");
 }
 
 /// Curved matter near a viewer has a part in a vertex's velocity that falls with the square of the distance, or its difference
