@@ -251,7 +251,8 @@ pub(super) fn summarize(rendering: &Rendering, seconds: f64, target_error: Optio
     console::note(format_args!(
         "{w}x{h}, {spp} spp, {seconds:.2} s, relative noise {noise:.2} %{complete}"
     ));
-    if let Some(target) = target_error.filter(|target| rendering.complete && noise > 100.0 * target) {
+    if let Some(target) = target_error.filter(|target| rendering.complete && noise > 100.0 * target)
+    {
         console::note(format_args!(
             "note: the noise is above the target error of {:.2} %: the time or the samples that were given ended first",
             100.0 * target
