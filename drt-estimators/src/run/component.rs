@@ -13,6 +13,7 @@ use crate::model::rendering::Account;
 use crate::sampling::parallel::Pool;
 use crate::terms::boundary_source::BoundarySource;
 use crate::terms::guiding::{Guiding, Sizes};
+use crate::terms::level::Levels;
 use crate::terms::prepared::Prepared;
 use crate::world::{ActiveFactors, World};
 
@@ -66,9 +67,27 @@ impl<U: Unknowns> Component<U> {
         Ok(Self { prepared, unknowns, guiding, guided: settings.guiding })
     }
 
-    /// Forgets what is known of where samples should go.
-    pub(crate) fn forget_guides(&mut self) {
+    /// Forgets what is known of where samples should go, and of what they will see.
+    pub(crate) fn forget_pilots(&mut self) {
         self.guiding.fill_with(Guiding::default);
+        self.prepared.levels = Levels::default();
+    }
+
+    /// Learns the levels of pixels for a run of so many samples of each, where they are not known. False when cancelled.
+    pub(crate) fn learn_levels(
+        &mut self,
+        seed: u64,
+        spp: u32,
+        pool: &Pool,
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> (Account, bool) {
+        if !(self.prepared.levels.is_empty() && self.unknowns.active().any()) {
+            return (Account::default(), true);
+        }
+        let Prepared { world, terms, .. } = &self.prepared;
+        let (account, levels) = Levels::learn(world, terms, seed, spp, pool, cancelled);
+        self.prepared.levels = levels;
+        (account, !cancelled())
     }
 
     /// Learns how to guide a source that takes so many samples in all, by a pilot whose samples are as large as `sizes` tell, and in the

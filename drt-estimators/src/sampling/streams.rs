@@ -11,6 +11,7 @@ pub(crate) const PAIR_STREAM: u64 = 1 << 59;
 pub(crate) const VELOCITY_STREAM: u64 = 1 << 58;
 pub(crate) const GUIDE_STREAM: u64 = 1 << 57;
 pub(crate) const PROBE_STREAM: u64 = 1 << 56;
+pub(crate) const LEVEL_STREAM: u64 = 1 << 55;
 /// Numbers of a sample that are spread evenly: image point, and the first vertices.
 pub(crate) const DIMENSIONS: u32 = SET_DIMENSIONS;
 

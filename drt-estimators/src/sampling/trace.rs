@@ -119,6 +119,10 @@ pub(crate) trait Observer {
         _rng: &Rng,
     ) {
     }
+    /// Whether a ray of the camera is to be recorded that leaves the scene and finds no light.
+    fn keeps_escapes(&self) -> bool {
+        false
+    }
     /// `node` was connected to a light.
     fn connect(&mut self, _node: u32, _connection: &Connection, _crossings: &[Crossing]) {}
 }

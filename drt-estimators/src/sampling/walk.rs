@@ -237,7 +237,8 @@ impl Tracer<'_> {
         observer: &mut O,
     ) {
         let met = leaving.met(self.world, ray).filter(|_| M::EMISSION);
-        let Some((radiance, emission_weight)) = met else { return };
+        let unlit = (leaving.node == 0 && observer.keeps_escapes()).then_some((Rgb::ZERO, 0.0));
+        let Some((radiance, emission_weight)) = met.or(unlit) else { return };
         let throughput = leaving.throughput * arrival;
         let radiance = radiance * emission_weight;
         observer.contribution(Pixel::Own, leaving.segments + 1, throughput * radiance);

@@ -6,6 +6,7 @@ pub(crate) mod edge_queries;
 pub(crate) mod flux;
 pub(crate) mod guiding;
 pub(crate) mod interior;
+pub(crate) mod level;
 pub(crate) mod light_paths;
 pub(crate) mod prepared;
 pub(crate) mod selected;

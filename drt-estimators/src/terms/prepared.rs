@@ -8,6 +8,7 @@ use crate::derivative::velocity::Spatial;
 use crate::sampling::film::BATCHES;
 use crate::terms::boundary_source::BoundarySource;
 use crate::terms::interior::Component;
+use crate::terms::level::Levels;
 use crate::terms::selected::Terms;
 use crate::terms::splatting::Splatter;
 use crate::world::World;
@@ -21,11 +22,13 @@ pub(crate) struct Prepared {
     pub(crate) terms: Terms,
     /// The part of boundary samples that edges seen from the camera take of an equal one.
     pub(crate) primary_share: f64,
+    /// What the motion of the camera's rays is taken relative to.
+    pub(crate) levels: Levels,
 }
 
 impl Prepared {
     pub(crate) fn new(estimator: &'static str, world: World, terms: Terms) -> Self {
-        Self { estimator, world, terms, primary_share: 1.0 }
+        Self { estimator, world, terms, primary_share: 1.0, levels: Levels::default() }
     }
 
     /// Changes how vertices move in the spatial form.
@@ -42,7 +45,8 @@ impl Prepared {
 
     /// Its part in the derivatives of paths.
     pub(crate) fn component<S>(&self, sink: S) -> Component<'_, S> {
-        Component { world: &self.world, terms: &self.terms, queries: self.terms.queries, sink }
+        let Self { world, terms, levels, .. } = self;
+        Component { world, terms, levels, queries: terms.queries, sink }
     }
 
     /// `all` is the world lit by all emitters.

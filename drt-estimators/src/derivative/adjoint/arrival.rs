@@ -44,7 +44,8 @@ struct Segment<'a> {
     parallel: bool,
     /// a_k R_k, what reaches the parent per unit of its scattering.
     value: Rgb,
-    /// Θ_k R_k, what the factors of the segment multiply.
+    /// a_k and Θ_k times what the factors of the segment multiply: R_k, less the level of the pixel where the camera looks along it.
+    measured: Rgb,
     weight: Rgb,
     near_moves: bool,
     ray_moves: bool,
@@ -64,6 +65,7 @@ impl<'a> Segment<'a> {
         node: usize,
         motion: &'a NodeMotion<'a>,
         received: Rgb,
+        level: Rgb,
         parallel_rays: bool,
     ) -> Option<Self> {
         let recorded = &path.record.nodes[node];
@@ -83,7 +85,8 @@ impl<'a> Segment<'a> {
             phi: if fixed { 0.0 } else { motion.velocity.blend.weight },
             parallel,
             value: arrival.arrival * received,
-            weight: arrival.throughput * received,
+            measured: arrival.arrival * (received - level),
+            weight: arrival.throughput * (received - level),
             near_moves,
             ray_moves: near_moves || motion.ray.is_some(),
         })
@@ -144,12 +147,14 @@ impl Differentiator<'_> {
         k: usize,
         motion: &NodeMotion<'_>,
         received: Rgb,
+        level: Rgb,
         here: &mut SurfaceAdjoint,
         before: &mut [SurfaceAdjoint],
         sink: &mut S,
     ) {
         let parallel_rays = self.world.camera.viewpoint().is_at_infinity();
-        let Some(segment) = &Segment::new(recorded, k, motion, received, parallel_rays) else {
+        let Some(segment) = &Segment::new(recorded, k, motion, received, level, parallel_rays)
+        else {
             return;
         };
         self.pass_on(segment);
@@ -209,7 +214,8 @@ impl Differentiator<'_> {
     /// Nothing comes back along the segment, and nothing that the node has collected moves what comes before it.
     #[inline]
     fn ends_here(&self, segment: &Segment<'_>, here: &SurfaceAdjoint) -> bool {
-        if !segment.value.is_zero() {
+        let outside = segment.vertex.is_none() && !segment.value.is_zero();
+        if outside || !segment.measured.is_zero() {
             return false;
         }
         let Local { matter, turn, .. } = self.locals[segment.node];
@@ -282,9 +288,9 @@ impl Differentiator<'_> {
         there: &mut SurfaceAdjoint,
         sink: &mut S,
     ) {
-        let Segment { arrival, phi, value, weight, ray_moves, .. } = *segment;
+        let Segment { arrival, phi, measured, weight, ray_moves, .. } = *segment;
         if let Some(filter) = segment.filter().filter(|_| sink.active().sensor) {
-            self.seen(None, arrival.dir, value, filter, phi, sink.active());
+            self.seen(None, arrival.dir, measured, filter, phi, sink.active());
         }
         let mut along = self.segment(stretch, Far::Direction, ray_moves, weight, there, sink);
         // Only rays of the camera, and those that turn with edges or behind smooth surfaces, come to see another part of it.
@@ -354,14 +360,14 @@ impl Differentiator<'_> {
         v: &Vertex,
         sink: &mut S,
     ) -> RgbVec {
-        let Segment { arrival, phi, value, .. } = *segment;
+        let Segment { arrival, phi, measured, .. } = *segment;
         let active = sink.active();
         let slides = !segment.motion.auxiliary.is_empty() || moves(v, active);
         let Some(filter) = segment.filter().filter(|_| phi > 0.0 && (active.sensor || slides))
         else {
             return RgbVec::ZERO;
         };
-        self.seen(Some(v), arrival.dir, value, filter, phi, active) * phi
+        self.seen(Some(v), arrival.dir, measured, filter, phi, active) * phi
     }
 
     /// A segment between two points, for a `weight` of light that passes: the geometric term, the Jacobian at v and transmittance. The far
@@ -398,12 +404,12 @@ impl Differentiator<'_> {
         sink: &mut S,
     ) {
         let Some(ray) = segment.motion.ray.filter(|_| !self.edges_at_rest) else { return };
-        let Segment { arrival, value, weight, .. } = *segment;
+        let Segment { arrival, measured, weight, .. } = *segment;
         let RayTurn { weight: share, gradient, .. } = *ray.turn;
         let mut all = turned.wholly;
         if let Some(filter) = segment.filter() {
             // A direction has no parallax.
-            all += self.seen(None, arrival.dir, value, filter, share, sink.active());
+            all += self.seen(None, arrival.dir, measured, filter, share, sink.active());
             // What the camera's image point does is replaced.
             turned.at_image_point -= turned.wholly * share + weight.outer(gradient);
         }

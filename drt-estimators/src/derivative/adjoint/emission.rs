@@ -70,7 +70,7 @@ impl Differentiator<'_> {
         let motion = NodeMotion { velocity, auxiliary: &auxiliary, ray };
         self.alone(k, |sweep| {
             let here = &mut SurfaceAdjoint::default();
-            sweep.arrive(recorded, k, &motion, emitted, here, before, sink);
+            sweep.arrive(recorded, k, &motion, emitted, Rgb::ZERO, here, before, sink);
         });
         self.parts = parts;
         true

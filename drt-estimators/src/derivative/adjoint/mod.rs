@@ -117,6 +117,8 @@ pub(crate) struct Differentiator<'w> {
     /// When true, rays do not turn and vertices do not move with what auxiliary rays find, to find the contribution of
     /// these motions.
     pub(crate) edges_at_rest: bool,
+    /// The [level](crate::terms::level) of the pixel.
+    pub(crate) level: Rgb,
     locals: Vec<Local>,
     /// Derivatives with respect to the velocity and normals of each vertex.
     ends: Vec<SurfaceAdjoint>,
@@ -147,6 +149,7 @@ impl<'w> Differentiator<'w> {
             world,
             camera: Cow::Borrowed(&world.camera),
             edges_at_rest: false,
+            level: Rgb::ZERO,
             locals: Vec::new(),
             ends: Vec::new(),
             points: Vec::new(),
@@ -230,6 +233,8 @@ impl<'w> Differentiator<'w> {
         let world = self.world;
         let theta = arrival.throughput;
         let control = path.control(k);
+        let from_camera = arrival.parent == 0 && matches!(node.role, Role::Walked);
+        let level = if from_camera { self.level } else { Rgb::ZERO };
         let mut of_joint;
         let (mut collected, here, before) = match node.role {
             Role::Walked => {
@@ -245,10 +250,15 @@ impl<'w> Differentiator<'w> {
         };
         let received = match &arrival.end {
             Endpoint::Environment => {
-                let environment = world.lights.environment().filter(|_| lit.by_surroundings());
-                let Some(environment) = environment else { return };
-                surroundings(environment, arrival.dir, theta * arrival.emission_weight, sink);
-                environment.radiance(arrival.dir) * arrival.emission_weight
+                match world.lights.environment().filter(|_| lit.by_surroundings()) {
+                    Some(environment) => {
+                        let seen = theta * arrival.emission_weight;
+                        surroundings(environment, arrival.dir, seen, sink);
+                        environment.radiance(arrival.dir) * arrival.emission_weight
+                    }
+                    None if level.is_zero() => return,
+                    None => Rgb::ZERO,
+                }
             }
             Endpoint::Surface(vertex) => {
                 collected += self.connections(path, k, vertex, theta, here, before, sink);
@@ -292,7 +302,7 @@ impl<'w> Differentiator<'w> {
             _ => Rgb::ONE,
         };
         self.control = theta * passes * control;
-        self.arrive(path, k, &path.motion(k), received, here, before, sink);
+        self.arrive(path, k, &path.motion(k), received, level, here, before, sink);
         self.control_alone(path, k, sink);
     }
 

@@ -31,7 +31,7 @@ impl Differentiator<'_> {
         self.coefficients(vertex, &adjoint, path.velocities.moves(k), here, sink);
         let control = arrival.throughput * path.control(k) * share;
         self.control_at(vertex, arrival.dir, control, sink);
-        self.arrive(path, k, &path.motion(k), Rgb::ZERO, here, before, sink);
+        self.arrive(path, k, &path.motion(k), Rgb::ZERO, Rgb::ZERO, here, before, sink);
     }
 }
 

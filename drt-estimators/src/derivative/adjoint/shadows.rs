@@ -3,6 +3,8 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use drt_math::Rgb;
+
 use crate::derivative::adjoint::connections::NextEvent;
 use crate::derivative::adjoint::turning::{RayMotion, found_ray};
 use crate::derivative::adjoint::{Behind, Differentiator, Local, NodeMotion};
@@ -61,7 +63,7 @@ impl Differentiator<'_> {
             self.alone(k, |sweep| {
                 let here = &mut SurfaceAdjoint::default();
                 sweep.connect(recorded, -arrival.dir, vertex, &event, here, before, sink);
-                sweep.arrive(recorded, k, &motion, received, here, before, sink);
+                sweep.arrive(recorded, k, &motion, received, Rgb::ZERO, here, before, sink);
             });
         }
         self.with_shadows = parts;
@@ -121,13 +123,13 @@ impl Differentiator<'_> {
             let motion = NodeMotion { velocity: &velocity, auxiliary: &[], ray };
             if node == k {
                 let received = event.c.f * event.c.rest();
-                self.arrive(recorded, node, &motion, received, own, before, sink);
+                self.arrive(recorded, node, &motion, received, Rgb::ZERO, own, before, sink);
                 continue;
             }
             let at = &record.nodes[node];
             let received = at.value * at.inv_pdf * self.locals[node].children;
             let Some((here, before)) = before[..=node].split_last_mut() else { continue };
-            self.arrive(recorded, node, &motion, received, here, before, sink);
+            self.arrive(recorded, node, &motion, received, Rgb::ZERO, here, before, sink);
         }
         for (node, (local, end)) in nodes.into_iter().zip(ordinary) {
             let own = core::mem::replace(&mut self.locals[node], local);

@@ -178,6 +178,12 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         false
     }
 
+    /// Whether the image points of the camera's rays move by a rate that is continuous wherever light does not jump, equals that of the jump
+    /// where it does, and is zero at the ends of the pixel's filter, so that a constant radiance has no derivative in any pixel.
+    fn is_continuous_in_view(&self) -> bool {
+        false
+    }
+
     /// Whether an index of refraction changes that turns light where it goes on from a surface point in a single direction.
     fn bends(&self, _s: &SurfacePoint) -> bool {
         false

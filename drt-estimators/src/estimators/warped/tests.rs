@@ -1,6 +1,7 @@
 //! Derivatives without samples of edges are those with them, and what is wrong with a field is found.
 
 mod chains;
+mod levels;
 mod slab;
 
 use alloc::sync::Arc;

@@ -116,6 +116,10 @@ impl VelocityField for EdgeTurns {
         true
     }
 
+    fn is_continuous_in_view(&self) -> bool {
+        true
+    }
+
     fn bends(&self, s: &SurfacePoint) -> bool {
         self.bending[s.shape as usize]
     }

@@ -178,8 +178,13 @@ impl PreparedGradient {
         let mut pilots = Account::default();
         let cancelled = || control.cancelled();
         for (c, component) in self.components.iter_mut().enumerate() {
-            component.forget_guides();
+            component.forget_pilots();
             let seed = seed_of_component(seed, c);
+            let (account, going) = component.learn_levels(seed, spp, pool, &cancelled);
+            pilots.add(account);
+            if !going {
+                return None;
+            }
             for i in 0..component.sources().len() {
                 let ratio = component.prepared.source_ratio(i);
                 let samples = f64::from(spp) * ratio * adjoint.len() as f64;

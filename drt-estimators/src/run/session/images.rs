@@ -51,7 +51,7 @@ impl Images {
     /// Forgets what has been accumulated.
     pub(super) fn clear(&mut self) {
         self.splats.iter_mut().for_each(SplatFilm::clear);
-        self.component.forget_guides();
+        self.component.forget_pilots();
     }
 
     /// Learns how to guide a source that takes so many samples in all, by a pilot; false when cancelled.

@@ -282,6 +282,16 @@ impl Session {
     fn learn_guides(&mut self, sources: &[(usize, usize)], pass: &Pass<'_>) -> bool {
         let [w, h] = self.film.size();
         let of_pixel = f64::from(self.samples) + f64::from(pass.spp);
+        for (c, images) in self.images.iter_mut().enumerate() {
+            let seed = seed_of_component(self.settings.seed, c);
+            let cancelled = || pass.control.cancelled();
+            let component = &mut images.component;
+            let (account, going) = component.learn_levels(seed, pass.spp, pass.pool, &cancelled);
+            self.account.add(account);
+            if !going {
+                return false;
+            }
+        }
         for &(c, i) in sources {
             let samples = of_pixel * self.source_ratio(c, i) * f64::from(w) * f64::from(h);
             let seed = seed_of_component(self.settings.seed, c);

@@ -17,6 +17,7 @@ use crate::terms::edge_queries::{EdgeContribution, EdgeQuery, QueryRate, SeenEdg
 use crate::terms::flux::FluxRay;
 use crate::terms::interior::PathSink;
 use crate::terms::interior::recorder::PathView;
+use crate::terms::level::Levels;
 use crate::terms::selected::Terms;
 use crate::world::{RayPath, World};
 
@@ -25,6 +26,7 @@ pub(crate) struct Component<'a, S> {
     /// The scene, lit by what this estimator differentiates.
     pub(crate) world: &'a World,
     pub(crate) terms: &'a Terms,
+    pub(crate) levels: &'a Levels,
     /// How often paths query edges, which may be other than the terms have it.
     pub(crate) queries: QueryRate,
     pub(crate) sink: S,
@@ -33,6 +35,7 @@ pub(crate) struct Component<'a, S> {
 /// A component at work.
 pub(super) struct Worker<'a, S> {
     pub(super) terms: &'a Terms,
+    pub(super) levels: &'a Levels,
     pub(super) queries: QueryRate,
     pub(super) sink: S,
     pub(super) differentiator: Differentiator<'a>,
@@ -62,12 +65,14 @@ pub(super) struct Traced<'t> {
 impl<'a, S: PathSink> Worker<'a, S> {
     /// With what it keeps of each path.
     pub(super) fn new(component: Component<'a, S>, separate: bool) -> (Self, PathView<'a>) {
-        let Component { world, terms, queries, sink } = component;
+        let Component { world, terms, levels, queries, sink } = component;
         let velocities = PathVelocities::new(Arc::clone(&terms.velocity));
         let pairs = AntitheticPairs::new(terms.lobe_pairs);
-        let view = PathView::new(world, velocities, pairs, terms.flux.as_ref()).with_probes();
+        let mut view = PathView::new(world, velocities, pairs, terms.flux.as_ref()).with_probes();
+        view.keeps_escapes = !levels.is_empty();
         let worker = Self {
             terms,
+            levels,
             queries,
             sink,
             differentiator: Differentiator::new(world),
@@ -154,10 +159,13 @@ impl<'a, S: PathSink> Worker<'a, S> {
         view: &PathView<'_>,
         values: &mut [Rgb],
     ) {
-        let Self { sink, differentiator, incoming, .. } = self;
+        let Self { sink, differentiator, incoming, levels, .. } = self;
         if !sink.active().any() {
             return;
         }
+        // Rays that do not turn with edges have rates that jump there.
+        let turns = !differentiator.edges_at_rest;
+        differentiator.level = if turns { levels.of(path.pixel) } else { Rgb::ZERO };
         self.differentiated += 1;
         let line = Rng::new(path.seed, LINE_STREAM | u64::from(path.pixel), path.unit);
         sink.begin();

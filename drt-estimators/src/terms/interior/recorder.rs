@@ -25,6 +25,8 @@ pub(crate) struct PathView<'a> {
     pub(crate) flux: Option<Reservoir>,
     /// What scattering collects at the path's probe, where extinctions are differentiated by probes as well.
     probed: Option<Rgb>,
+    /// Its derivatives have a part in what sees no light at all.
+    pub(crate) keeps_escapes: bool,
     /// A ray that was looked at for nothing else.
     looked: RayPath,
 }
@@ -37,7 +39,8 @@ impl<'a> PathView<'a> {
         flux: Option<&Flux>,
     ) -> Self {
         let flux = flux.map(Reservoir::new);
-        Self { world, velocities, pairs, flux, probed: None, looked: RayPath::default() }
+        let (probed, keeps_escapes, looked) = (None, false, RayPath::default());
+        Self { world, velocities, pairs, flux, probed, keeps_escapes, looked }
     }
 
     /// Leaves to probes what these are better at.
@@ -185,6 +188,10 @@ impl Observer for Recorder<'_, '_> {
             }
             view.pairs.offer(view.world, self.record, &view.velocities, leaving, rng);
         }
+    }
+
+    fn keeps_escapes(&self) -> bool {
+        self.views.iter().any(|view| view.keeps_escapes)
     }
 
     fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
