@@ -57,6 +57,9 @@ pub enum FilterKind {
 /// less than anything that an image shows.
 pub(crate) const ON_BORDER: f64 = 1e-8;
 
+/// How near to a border the ends of an edge are that is seen along it, in pixels: files have coordinates of single precision, or of six digits.
+pub(crate) const ALONG_BORDER: f64 = 1e-4;
+
 impl FilterKind {
     /// Mitsuba's `box`: every point counts towards the pixel it lies in.
     pub const BOX: Self = Self::Box { radius: 0.5 };
@@ -250,10 +253,10 @@ impl Filter {
         self.kind == FilterKind::BOX
     }
 
-    /// Whether an image coordinate is that of a border between two pixels of a filter that [tiles](Self::tiles).
+    /// Whether what has this image coordinate is seen along a border between two pixels of a filter that [tiles](Self::tiles).
     pub(crate) fn is_border(at: f64) -> bool {
         let beside = at - fm::floor(at);
-        f64::min(beside, 1.0 - beside) < ON_BORDER
+        f64::min(beside, 1.0 - beside) < ALONG_BORDER
     }
 
     /// P at an offset from the pixel's centre, per square pixel.
@@ -275,23 +278,24 @@ impl Filter {
     /// however the filter does, and its gradient. Its product with P has a slope that P bounds.
     #[must_use]
     pub(crate) fn window(&self, offset: [f64; 2]) -> (f64, [f64; 2]) {
-        let [(x, dx), (y, dy)] = offset.map(|o| {
-            let (height, slope, steepness) = match self.kind {
-                FilterKind::Box { .. }
-                | FilterKind::Mitchell { .. }
-                | FilterKind::Lanczos { .. } => {
-                    let s = o / self.radius;
-                    (f64::max(1.0 - s * s, 0.0), -2.0 * s / self.radius, 2)
-                }
-                FilterKind::Tent { .. } | FilterKind::Gaussian { .. } => {
-                    let (height, slope) = self.axis_with_slope(o);
-                    (height / self.peak, slope / self.peak, 6)
-                }
-            };
-            let rest = Real::powi(1.0 - height, steepness - 1);
-            (1.0 - rest * (1.0 - height), f64::from(steepness) * rest * slope)
-        });
+        let [(x, dx), (y, dy)] = offset.map(|o| self.window_along(o));
         (x * y, [dx * y, x * dy])
+    }
+
+    /// The factor of one axis, and its slope.
+    pub(crate) fn window_along(&self, o: f64) -> (f64, f64) {
+        let (height, slope, steepness) = match self.kind {
+            FilterKind::Box { .. } | FilterKind::Mitchell { .. } | FilterKind::Lanczos { .. } => {
+                let s = o / self.radius;
+                (f64::max(1.0 - s * s, 0.0), -2.0 * s / self.radius, 2)
+            }
+            FilterKind::Tent { .. } | FilterKind::Gaussian { .. } => {
+                let (height, slope) = self.axis_with_slope(o);
+                (height / self.peak, slope / self.peak, 6)
+            }
+        };
+        let rest = Real::powi(1.0 - height, steepness - 1);
+        (1.0 - rest * (1.0 - height), f64::from(steepness) * rest * slope)
     }
 
     /// The factor p of one axis, per pixel.

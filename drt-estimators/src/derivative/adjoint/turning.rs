@@ -59,7 +59,7 @@ impl RayMotion<'_> {
         let across = turned.map(|g| g.reject(dir));
         let mut origin = RgbVec::ZERO;
         for part in self.parts {
-            let g = across * part.rate + weight.outer(part.divergence);
+            let g = across.map(|g| part.rate.transpose_mul(g)) + weight.outer(part.divergence);
             // Where surfaces intersect two parts share the origin: each loses its velocity from that of its own point.
             let place = part.matter.map_or(g, |matter| g.map(|g| matter.pull(g)));
             if let Some(matter) = part.matter {

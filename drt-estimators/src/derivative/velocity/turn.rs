@@ -34,8 +34,8 @@ use crate::world::vertex::{SurfacePoint, Vertex};
 pub(crate) struct TurnPart {
     /// The point; `None` of what is at rest.
     pub(crate) matter: Option<EdgeMatter>,
-    /// λ / r: the direction's rate per unit of w across the ray. 1 / scene units.
-    pub(crate) rate: f64,
+    /// The direction's rate by w; 1 / scene units. λ / r of what is across the ray, where all λ are numbers.
+    pub(crate) rate: Mat3,
     /// What its dot product with w gives to div T. 1 / scene units.
     pub(crate) divergence: Vec3,
 }

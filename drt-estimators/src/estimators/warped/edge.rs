@@ -67,10 +67,10 @@ impl TurningEdge {
 
     /// Whether radiance jumps there, seen from the front of both faces and from their back; it does where they are one plane, or where there is one
     /// face alone, at which nothing else jumps.
-    pub(super) fn jumps(&self) -> [bool; 2] {
+    pub(super) fn is_discontinuous(&self) -> [bool; 2] {
         let Some((normals, discontinuous)) = &self.crease else { return [true; 2] };
         let one_plane = normals[0].cross(normals[1]).length_squared() < 1e-18;
-        discontinuous.map(|jumps| one_plane || (jumps && !self.untracked))
+        discontinuous.map(|side| one_plane || (side && !self.untracked))
     }
 
     /// What radiance does there, seen along a vector.

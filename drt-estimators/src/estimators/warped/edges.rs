@@ -10,10 +10,11 @@ use drt_geom::Mesh;
 use drt_geom::edges::{Cone, ConeSegment, ConeTree};
 use drt_math::{Mat3, Vec3};
 
-use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay, Weight};
+use crate::derivative::velocity::{EdgeMatter, RayTurn, TurnPart, TurningRay, Weight};
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::estimators::warped::beside::Beside;
 use crate::estimators::warped::edge::{TurningEdge, is_untracked};
+use crate::estimators::warped::held::{self, Border, Found};
 use crate::estimators::warped::near::Near;
 use crate::model::scene::{Scene, Shape};
 use crate::world::World;
@@ -77,7 +78,7 @@ impl TurningEdges {
         for (edge, turning) in edges.list.iter().zip(&list) {
             let Some(shape) = edges.shape_of_faces(world, edge) else { continue };
             let sides = &mut even[shape as usize];
-            for (even, discontinuous) in sides.iter_mut().zip(turning.jumps()) {
+            for (even, discontinuous) in sides.iter_mut().zip(turning.is_discontinuous()) {
                 *even |= !discontinuous;
             }
         }
@@ -193,6 +194,33 @@ impl TurningEdges {
         Some(RayTurn { weight, gradient, parts: first..parts.len(), chain: 0..0, shadow: None })
     }
 
+    /// As [`turn`](Self::turn), by the rate that [holds](super::held) to edges and borders across alone.
+    pub(super) fn turn_held(
+        &self,
+        ray: &TurningRay<'_>,
+        angle: f64,
+        borders: &[Border],
+        always: bool,
+        parts: &mut Vec<TurnPart>,
+    ) -> Option<RayTurn> {
+        let near = self.near(ray, angle);
+        if !(ray.moves || always || self.any_moves_near(&near)) {
+            return None;
+        }
+        let (mut sum, mut all) = (Weight::default(), Vec::new());
+        self.visit(&near, |edge, beside, weight| {
+            sum += weight;
+            all.push(Found { edge, beside: *beside, weight });
+        });
+        if sum.value == 0.0 {
+            return None;
+        }
+        let first = parts.len();
+        held::turn(ray.dir, &all, borders, ray.moves, parts);
+        let Weight { value: weight, gradient } = sum / (Weight::constant(1.0) + sum);
+        Some(RayTurn { weight, gradient, parts: first..parts.len(), chain: 0..0, shadow: None })
+    }
+
     /// Adds up the weights of edges beside a ray, and what they turn it by if these were divided by 1.
     pub(super) fn gather_beside(
         &self,
@@ -205,18 +233,17 @@ impl TurningEdges {
 
     fn gather(&self, near: &Near, viewer_moves: bool, parts: &mut Vec<TurnPart>) -> Weight {
         let mut sum = Weight::default();
-        let mut resting = TurnPart { matter: None, rate: 0.0, divergence: Vec3::ZERO };
+        let mut resting = Weight::default();
         self.visit(near, |edge, beside, weight| {
             sum += weight;
             // Of one of the ends, whose part in the nearest point is so much.
             let mut add = |matter, part: Weight| {
                 let Weight { value: rate, gradient: divergence } = weight * part / beside.distance;
                 match matter {
-                    Some(_) => parts.push(TurnPart { matter, rate, divergence }),
-                    None => {
-                        resting.rate += rate;
-                        resting.divergence += divergence;
+                    Some(_) => {
+                        parts.push(even(matter, Weight { value: rate, gradient: divergence }))
                     }
+                    None => resting += Weight { value: rate, gradient: divergence },
                 }
             };
             let one = Weight::constant(1.0);
@@ -228,14 +255,18 @@ impl TurningEdges {
                 add(None, one);
             }
         });
-        if resting.rate > 0.0 {
-            parts.push(resting);
+        if resting.value > 0.0 {
+            parts.push(even(None, resting));
         }
         sum
     }
 
     /// Tells all edges that have a weight, and how near they are.
-    pub(super) fn visit(&self, near: &Near, mut found: impl FnMut(&TurningEdge, &Beside, Weight)) {
+    pub(super) fn visit<'a>(
+        &'a self,
+        near: &Near,
+        mut found: impl FnMut(&'a TurningEdge, &Beside, Weight),
+    ) {
         let all = self.all.visit::<Infallible>(&near.cone, &near.narrow, |i| {
             let edge = &self.list[i as usize];
             if let Some((beside, weight)) = near.weight(edge) {
@@ -283,11 +314,17 @@ fn normal_slopes(mesh: &Mesh) -> Vec<Mat3> {
     (0..mesh.positions.len()).map(mean).collect()
 }
 
-/// Divides what turns a ray by the sum of all weights.
+/// A summand that is not divided yet, whose rate is the same in all directions across the ray.
+fn even(matter: Option<EdgeMatter>, rate: Weight) -> TurnPart {
+    TurnPart { matter, rate: Mat3::IDENTITY * rate.value, divergence: rate.gradient }
+}
+
+/// Divides what turns a ray evenly by the sum of all weights.
 pub(super) fn divide(parts: &mut [TurnPart], dir: Vec3, total: Weight) {
     for part in parts {
-        let share = Weight { value: part.rate, gradient: part.divergence } / total;
-        part.rate = share.value;
+        let even = part.rate.trace() / 3.0;
+        let share = Weight { value: even, gradient: part.divergence } / total;
+        part.rate = Mat3::IDENTITY * share.value;
         // What is across the ray turns along it as the ray turns.
         part.divergence = share.gradient - dir * (2.0 * share.value);
     }

@@ -17,15 +17,17 @@
 //! The default uses the edges themselves. In the spatial form (theory sheet §3, §10 route B) a path is a function
 //! of directions, and radiance jumps at directions in which an edge is seen from the ray's origin x: silhouettes,
 //! borders, and creases between faces of different radiance. A ray along the unit vector ω
-//! [turns](crate::derivative::velocity::RayTurn) at the rate
+//! [turns](crate::derivative::velocity::RayTurn) at a rate T(ω) that is near
 //!
 //! ```text
-//! T(ω) = Σ_e λ_e (1 - ω ω^T) (u_e - x_dot) / r_e,    λ_e = w_e / (1 + Σ w),
+//! c_e = (1 - ω ω^T) (u_e - x_dot) / r_e
 //! ```
 //!
-//! summed over all edges within an angle Δ of ω (0.1 radians; less for camera rays and creases of curved surfaces).
+//! beside each edge within an angle Δ of ω (0.1 radians; less for camera rays and creases of curved surfaces).
 //! Here e is the point of an edge that is nearest to the ray, u_e its velocity, r_e its distance from x, and x_dot the
-//! velocity of x. With q the squared sine of the angle between ω and e,
+//! velocity of x. T is a mean of the c_e with weights w_e that are [matrices](held): across an edge it follows the edge, and along it T is free.
+//! Where the camera moves, for shadows of points and past smooth surfaces, they are numbers, T = Σ λ_e c_e with λ_e = w_e / (1 + Σ w).
+//! With q the squared sine of the angle between ω and e,
 //!
 //! ```text
 //! w_e = c s (sin² Δ - q) / (q + (1 - s) sin² Δ).
@@ -34,7 +36,7 @@
 //! s is 1 for edges in front of the plane of the surface where the ray ends, and falls to 0 behind it. c is the sine of
 //! the angle that the edge subtends at x, over sin Δ, and at most 1: the many short edges of a fine mesh together have
 //! the weight of the line that they approximate, however fine the mesh is. So a single long edge has λ = 1 - q / sin²
-//! Δ. On an edge that is visible, the ray turns exactly as fast as the edge does, T is continuous wherever radiance is,
+//! Δ. On an edge that is visible, the ray turns across it exactly as fast as the edge does, T is continuous wherever radiance is,
 //! and its divergence is a closed form. There are no auxiliary rays and there is no bias.
 //!
 //! A crease between two faces of one shape is no discontinuity for a ray that ends on another shape. It counts only for
@@ -48,15 +50,14 @@
 //!
 //! | requirement (theory sheet §9) | why it holds |
 //! |---|---|
-//! | T is the velocity of each visible edge | its w diverges there, and no other weight does, except at points where edges cross |
+//! | T is the velocity of each visible edge across it | its w diverges there, and no other weight does, except at points where edges cross |
 //! | T is continuous elsewhere | which edges count depends on x and the shape where the ray ends, which changes at edges that count; w is continuous in ω, and s on a face |
 //! | s may differ on the two sides of a crease or silhouette | there T is that edge's velocity on both sides |
 //! | no condition at horizons | scattered light vanishes there; edges below them are left out |
 //! | x moves by its whole velocity | x_dot is that of the vertex before, its own turn included: each vertex is conditioned on the one before (theory sheet §9.3) |
 //!
-//! Where edges cross in projection, T has a limit that depends on direction: its divergence grows as one over the
-//! distance, with a finite mean and a second moment that diverges like a logarithm. This holds for every field of this
-//! kind.
+//! Where two edges cross in projection, one rate follows both, and T is near it on all sides. Where weights are numbers, T has a limit there that
+//! depends on direction: its divergence grows as one over the distance, with a finite mean and a second moment that diverges like a logarithm.
 //!
 //! Vertices on surfaces that are curved, by their normals or their facets, have the velocity u of their matter as far
 //! as edges leave weight for it and the vertex before is not near: v = λ_0 φ u + ..., with λ_0 = 1 - Σ λ. Creases
@@ -74,7 +75,7 @@
 //! # The camera
 //!
 //! Camera rays keep their image points (2019 paper) except where they turn with an edge. Where a filter jumps, the
-//! borders of its support are edges at rest in the image, and points seen there keep their image point: the material
+//! borders of its support are edges at rest in the image, across which no ray turns, and points seen there keep their image point: the material
 //! velocity of curved surfaces falls to zero towards borders.
 //!
 //! An edge that lies along a border, as in symmetric scenes, would require two velocities of one ray. No camera ray
@@ -104,6 +105,7 @@ mod beside;
 mod critical;
 mod edge;
 mod edges;
+mod held;
 mod near;
 mod shadows;
 #[cfg(all(test, feature = "std"))]

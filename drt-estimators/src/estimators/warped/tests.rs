@@ -1,6 +1,7 @@
 //! Derivatives without samples of edges are those with them, and what is wrong with a field is found.
 
 mod chains;
+mod held;
 mod levels;
 mod slab;
 
@@ -26,6 +27,11 @@ use crate::terms::prepared::Prepared;
 use crate::world::World;
 use crate::world::lights::{EmitterMask, LightSample};
 use crate::world::vertex::{Kind, Vertex};
+
+/// The divergence of a constant rate, across a direction that turns, by the constant's component along it.
+fn along(rate: Mat3, dir: Vec3) -> f64 {
+    rate.trace() - dir.dot(rate * dir)
+}
 
 /// What is wrong with a field.
 #[derive(Clone, Copy, Debug)]
@@ -73,14 +79,14 @@ impl VelocityField for Faulty {
             match self.fault {
                 Fault::Divergence => part.divergence = Vec3::ZERO,
                 Fault::Sign => {
-                    part.rate = -part.rate;
+                    part.rate = part.rate * -1.0;
                     part.divergence = -part.divergence;
                 }
                 Fault::Weight => {
-                    part.rate *= 0.8;
+                    part.rate = part.rate * 0.8;
                     part.divergence *= 0.8;
                 }
-                Fault::Direction => part.divergence += ray.dir * (2.0 * part.rate),
+                Fault::Direction => part.divergence += ray.dir * along(part.rate, ray.dir),
             }
         }
         Some(turn)
@@ -185,7 +191,7 @@ fn on_surfaces() {
     let scene = surfaces(diffuse(0.3, 0.5, 0.4), diffuse(0.6, 0.5, 0.7));
     let motion = parameter("ball", 0.0, alloc::vec![moves("ball", shift())]);
     let faults = [Fault::Divergence, Fault::Sign, Fault::Weight];
-    compare(&scene, &motion, MOMENT, &faults);
+    compare(&scene, &motion, Sum { samples: 256, ..MOMENT }, &faults);
 }
 
 /// The shadows that a card, out of view, casts on a floor, by a bulb and the sun.

@@ -12,8 +12,10 @@ use crate::derivative::velocity::{
 };
 use crate::estimators::warped::behind::TurnedBehind;
 use crate::estimators::warped::edges::{TurningEdges, divide};
+use crate::estimators::warped::held::Border;
 use crate::estimators::warped::near::ANGLE;
 use crate::estimators::warped::shadows::Flow;
+use crate::model::sensor::Pinhole;
 use crate::sampling::record::CameraRay;
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
@@ -35,6 +37,8 @@ pub(super) struct EdgeTurns {
     blended: Vec<bool>,
     /// Shapes whose index of refraction changes, and turns light that goes on in a single direction.
     bending: Vec<bool>,
+    /// The camera moves.
+    camera_moves: bool,
     /// Mean curvatures of the shapes, 1 / scene units: on curved surfaces vertices move with their matter.
     curvatures: Vec<f64>,
 }
@@ -51,7 +55,7 @@ impl EdgeTurns {
         let bending = world.scene.shapes.iter().map(|s| active.bending[s.bsdf]).collect();
         let shapes = 0..world.scene.shapes.len() as u32;
         let curvatures = shapes.map(|s| spatial.blends.curvature(s)).collect();
-        Self { spatial, edges, blended, bending, curvatures }
+        Self { spatial, edges, blended, bending, camera_moves: active.sensor, curvatures }
     }
 
     /// φ of a vertex on a curved surface; `None` on others. `of_camera` is the ray that the path starts with, where it is this
@@ -136,7 +140,10 @@ impl VelocityField for EdgeTurns {
             return None;
         }
         let (angle, rest) = around(world, ray);
-        self.edges.turn(ray, angle, rest, always, parts)
+        if ray.of_camera.is_some() && self.camera_moves {
+            return self.edges.turn(ray, angle, rest, always, parts);
+        }
+        self.edges.turn_held(ray, angle, &borders(world, ray), always, parts)
     }
 
     fn turn_with_chain(
@@ -201,6 +208,27 @@ impl VelocityField for EdgeTurns {
         self.of_matter(world, None, end, dir, distance)
             .unwrap_or_else(|| self.spatial.blend(world, viewer, end, dir, distance))
     }
+}
+
+/// The borders of the pixel that a ray of the camera is in, if a filter jumps there.
+fn borders(world: &World, ray: &TurningRay<'_>) -> Vec<Border> {
+    let Some(CameraRay { pixel, lens }) = ray.of_camera.filter(|_| world.camera.has_borders())
+    else {
+        return Vec::new();
+    };
+    let camera = &*world.camera.at_lens(lens);
+    let view = camera.view(camera.position() + ray.dir);
+    let Pinhole { right, up, forward, .. } = *camera.pinhole();
+    let border = |k: usize, axis: Vec3| {
+        let (window, slope) = camera.window_along(pixel, view.pixel, k);
+        let mut slopes = [0.0; 2];
+        slopes[k] = slope;
+        let (slope, _) = camera.view_gradient(&view, slopes, 0.0);
+        let gradient = slope.reject(ray.dir) * (-2.0 / (window * window * window));
+        let weight = Weight { value: 1.0 / (window * window) - 1.0, gradient };
+        Border { axis, forward, weight }
+    };
+    alloc::vec![border(0, right), border(1, up)]
 }
 
 /// Within which angle edges turn a ray, and the weight of what does not turn with it.

@@ -7,7 +7,7 @@
 
 use drt_math::{Affine, Frame, Ray, Real, Vec3, warp};
 
-use crate::model::filter::{Filter, FilterKind, ON_BORDER};
+use crate::model::filter::{ALONG_BORDER, Filter, FilterKind};
 use crate::model::sensor::{
     Lens, Projection, Response, Sensor, SensorError, SensorGradient, orthographic, unit,
 };
@@ -205,6 +205,11 @@ impl Sensor {
         self.filter.window([point[0] - center[0], point[1] - center[1]])
     }
 
+    /// The factor of that by one coordinate, and its slope.
+    pub(crate) fn window_along(&self, pixel: [u32; 2], point: [f64; 2], k: usize) -> (f64, f64) {
+        self.filter.window_along(point[k] - (f64::from(pixel[k]) + 0.5))
+    }
+
     /// True when the straight line between two points is seen along a border between pixels, by a filter that jumps there.
     pub(crate) fn sees_on_border(&self, ends: [Vec3; 2]) -> bool {
         if !(self.has_borders() && self.filter.tiles() && self.aperture.is_none()) {
@@ -212,7 +217,8 @@ impl Sensor {
         }
         let [a, b] = ends.map(|x| self.view(x));
         let along = |k: usize| {
-            Filter::is_border(a.pixel[k]) && Real::abs(a.pixel[k] - b.pixel[k]) < ON_BORDER
+            let [a, b] = [a.pixel[k], b.pixel[k]];
+            Filter::is_border(a) && Real::abs(a - b) < ALONG_BORDER
         };
         a.depth > 0.0 && b.depth > 0.0 && (along(0) || along(1))
     }

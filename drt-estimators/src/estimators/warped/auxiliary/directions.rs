@@ -8,7 +8,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::{Ray, Skip};
-use drt_math::{Frame, Real, Vec3, fm};
+use drt_math::{Frame, Mat3, Real, Vec3, fm};
 
 use crate::derivative::velocity::{
     Auxiliary, Blend, EdgeMatter, Found, Probe, RayTurn, Spatial, TurnPart, TurningRay,
@@ -158,7 +158,8 @@ impl VelocityField for AuxiliaryDirections {
             ratio(&samples[at(set.start)..at(set.end)], factor, |(matter, r), value, slope| {
                 let rate = value / r;
                 let divergence = slope / r - ray.dir * (2.0 * rate);
-                parts.push(TurnPart { matter: Some(EdgeMatter::of(matter)), rate, divergence });
+                let (matter, rate) = (Some(EdgeMatter::of(matter)), Mat3::IDENTITY * rate);
+                parts.push(TurnPart { matter, rate, divergence });
                 turn.weight += value;
                 turn.gradient += slope;
             });

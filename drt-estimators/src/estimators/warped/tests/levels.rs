@@ -8,7 +8,7 @@ use crate::sampling::parallel::Pool;
 use crate::terms::level::Levels;
 
 /// A ball and a cube before nothing, in the light of a lamp that is not seen, and a sky where that is asked for.
-fn before(filter: FilterKind, under_sky: bool) -> Scene {
+pub(super) fn before(filter: FilterKind, under_sky: bool) -> Scene {
     let cube = placed(procedural::cube(), vec3(0.3, 0.3, 0.3), 0.5, vec3(-0.4, -0.2, 0.3));
     let ball = placed(procedural::icosphere(3), Vec3::splat(0.6), 0.3, vec3(0.3, 0.1, 0.0));
     let ball = ball.with_smooth_normals();
