@@ -25,8 +25,8 @@
 //!
 //! beside each edge within an angle Δ of ω (0.1 radians; less for camera rays and creases of curved surfaces).
 //! Here e is the point of an edge that is nearest to the ray, u_e its velocity, r_e its distance from x, and x_dot the
-//! velocity of x. T is a mean of the c_e with weights w_e that are [matrices](held): across an edge it follows the edge, and along it T is free.
-//! Where the camera moves, for shadows of points and past smooth surfaces, they are numbers, T = Σ λ_e c_e with λ_e = w_e / (1 + Σ w).
+//! velocity of x. T is a mean of the c_e, T = Σ λ_e c_e with λ_e = w_e / (1 + Σ w). For the camera's rays where a filter jumps, and the camera
+//! is at rest, the weights are [matrices](held): across an edge T follows the edge, and along it T is free.
 //! With q the squared sine of the angle between ω and e,
 //!
 //! ```text
@@ -56,8 +56,10 @@
 //! | no condition at horizons | scattered light vanishes there; edges below them are left out |
 //! | x moves by its whole velocity | x_dot is that of the vertex before, its own turn included: each vertex is conditioned on the one before (theory sheet §9.3) |
 //!
-//! Where two edges cross in projection, one rate follows both, and T is near it on all sides. Where weights are numbers, T has a limit there that
-//! depends on direction: its divergence grows as one over the distance, with a finite mean and a second moment that diverges like a logarithm.
+//! Where two edges cross in projection, or an edge and the border of a pixel, T has a limit that depends on direction: its divergence grows as one over the
+//! distance, with a finite mean and a second moment that diverges like a logarithm. With matrices for weights one rate follows both, and T is near it on all
+//! sides. On the other hand, T then changes along an edge from one of its ends to the next, which on fine meshes costs more than crossings do where
+//! there are no borders.
 //!
 //! Vertices on surfaces that are curved, by their normals or their facets, have the velocity u of their matter as far
 //! as edges leave weight for it and the vertex before is not near: v = λ_0 φ u + ..., with λ_0 = 1 - Σ λ. Creases

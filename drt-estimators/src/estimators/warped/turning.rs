@@ -140,10 +140,12 @@ impl VelocityField for EdgeTurns {
             return None;
         }
         let (angle, rest) = around(world, ray);
-        if ray.of_camera.is_some() && self.camera_moves {
-            return self.edges.turn(ray, angle, rest, always, parts);
+        match borders(world, ray) {
+            Some(borders) if !self.camera_moves => {
+                self.edges.turn_held(ray, angle, &borders, always, parts)
+            }
+            _ => self.edges.turn(ray, angle, rest, always, parts),
         }
-        self.edges.turn_held(ray, angle, &borders(world, ray), always, parts)
     }
 
     fn turn_with_chain(
@@ -211,11 +213,8 @@ impl VelocityField for EdgeTurns {
 }
 
 /// The borders of the pixel that a ray of the camera is in, if a filter jumps there.
-fn borders(world: &World, ray: &TurningRay<'_>) -> Vec<Border> {
-    let Some(CameraRay { pixel, lens }) = ray.of_camera.filter(|_| world.camera.has_borders())
-    else {
-        return Vec::new();
-    };
+fn borders(world: &World, ray: &TurningRay<'_>) -> Option<[Border; 2]> {
+    let CameraRay { pixel, lens } = ray.of_camera.filter(|_| world.camera.has_borders())?;
     let camera = &*world.camera.at_lens(lens);
     let view = camera.view(camera.position() + ray.dir);
     let Pinhole { right, up, forward, .. } = *camera.pinhole();
@@ -228,7 +227,7 @@ fn borders(world: &World, ray: &TurningRay<'_>) -> Vec<Border> {
         let weight = Weight { value: 1.0 / (window * window) - 1.0, gradient };
         Border { axis, forward, weight }
     };
-    alloc::vec![border(0, right), border(1, up)]
+    Some([border(0, right), border(1, up)])
 }
 
 /// Within which angle edges turn a ray, and the weight of what does not turn with it.

@@ -26,6 +26,8 @@ fn rate(prepared: &Prepared, pixel: [u32; 2], dir: Vec3, c: Vec3) -> Option<(Vec
     let (mut parts, mut probe) = (Vec::new(), Probe::new(Rng::new(0, 0, 0)));
     prepared.terms.velocity.turn(world, &ray, &mut probe, &mut parts)?;
     let rate = parts.iter().fold(Vec3::ZERO, |sum, part| sum + part.rate * c);
+    // What is along the ray turns nothing.
+    let rate = rate.reject(dir);
     Some((rate, parts.iter().map(|part| part.divergence.dot(c)).sum()))
 }
 
