@@ -15,19 +15,8 @@ pub(super) struct Beside {
     pub(super) distance: Weight,
     /// The point, less the viewer's place.
     pub(super) place: Vec3,
-    /// Where the point is no end: the unit normal of the plane of edge and viewer, and `square` over that of the nearer end.
-    pub(super) held: Option<(Vec3, Weight)>,
-}
-
-/// Squared sine of the angle between the unit direction ω and a place; 1 from a right angle on.
-fn square_to(place: Vec3, w: Vec3) -> Weight {
-    let end = place.normalize();
-    let cosine = end.dot(w);
-    if cosine <= 0.0 {
-        return Weight::constant(1.0);
-    }
-    let value = end.cross(w).length_squared();
-    Weight { value, gradient: (end - w * cosine) * (-2.0 * cosine) }
+    /// Where the point is no end: the unit normal of the plane of edge and viewer.
+    pub(super) normal: Option<Vec3>,
 }
 
 impl Beside {
@@ -48,18 +37,15 @@ impl Beside {
                 let sine = n.dot(w);
                 let along = (to_start + to_side * s).reject(w) * (-1.0 / rate);
                 let distance = at.length();
-                let square = Weight { value: sine * sine, gradient: n.reject(w) * (2.0 * sine) };
-                let [to_a, to_b] = ends.map(|end| square_to(end, w));
-                let nearer = if to_a.value < to_b.value { to_a } else { to_b };
                 return Some(Self {
-                    square,
+                    square: Weight { value: sine * sine, gradient: n.reject(w) * (2.0 * sine) },
                     along: Weight { value: s, gradient: along },
                     distance: Weight {
                         value: distance,
                         gradient: along * (at.dot(side) / distance),
                     },
                     place: at,
-                    held: (nearer.value > 0.0).then(|| (n, square / nearer)),
+                    normal: Some(n),
                 });
             }
         }
@@ -74,7 +60,7 @@ impl Beside {
             along: Weight::constant(along),
             distance: Weight::constant(distance),
             place: end * distance,
-            held: None,
+            normal: None,
         })
     }
 
@@ -97,7 +83,7 @@ impl Beside {
             along: Weight { value: along, gradient: slope },
             distance: Weight::constant(scale),
             place,
-            held: None,
+            normal: None,
         }
     }
 }

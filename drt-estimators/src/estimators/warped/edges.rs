@@ -169,13 +169,15 @@ impl TurningEdges {
         any.is_break()
     }
 
-    /// How edges within an `angle` of a ray turn it, besides what does not turn with a weight of `rest` beside 1. Without any
+    /// How edges within an `angle` of a ray turn it, besides what does not turn with a weight of `rest` beside 1; across [alone](super::held) with
+    /// the `borders` of a pixel in place of that. Without any
     /// that moves, unless `always` or the viewer moves, they do not.
     pub(super) fn turn(
         &self,
         ray: &TurningRay<'_>,
         angle: f64,
         rest: Weight,
+        borders: Option<[Border; 2]>,
         always: bool,
         parts: &mut Vec<TurnPart>,
     ) -> Option<RayTurn> {
@@ -184,41 +186,38 @@ impl TurningEdges {
             return None;
         }
         let first = parts.len();
-        let sum = self.gather(&near, ray.moves, parts);
+        let (sum, rest) = match &borders {
+            Some(borders) => (self.gather_held(&near, ray, borders, parts), Weight::default()),
+            None => (self.gather(&near, ray.moves, parts), rest),
+        };
         if sum.value == 0.0 {
             return None;
         }
         let total = Weight::constant(1.0) + sum + rest;
-        divide(&mut parts[first..], ray.dir, total);
+        if borders.is_none() {
+            divide(&mut parts[first..], ray.dir, total);
+        }
         let Weight { value: weight, gradient } = sum / total;
         Some(RayTurn { weight, gradient, parts: first..parts.len(), chain: 0..0, shadow: None })
     }
 
-    /// As [`turn`](Self::turn), by the rate that [holds](super::held) to edges and borders across alone.
-    pub(super) fn turn_held(
+    /// Adds up the weights of edges beside a ray of a camera at rest, and what turns it across these and the borders of its pixel.
+    fn gather_held(
         &self,
+        near: &Near,
         ray: &TurningRay<'_>,
-        angle: f64,
         borders: &[Border],
-        always: bool,
         parts: &mut Vec<TurnPart>,
-    ) -> Option<RayTurn> {
-        let near = self.near(ray, angle);
-        if !(ray.moves || always || self.any_moves_near(&near)) {
-            return None;
-        }
+    ) -> Weight {
         let (mut sum, mut all) = (Weight::default(), Vec::new());
-        self.visit(&near, |edge, beside, weight| {
+        self.visit(near, |edge, beside, weight| {
             sum += weight;
             all.push(Found { edge, beside: *beside, weight });
         });
-        if sum.value == 0.0 {
-            return None;
+        if sum.value > 0.0 {
+            held::turn(ray.viewer.x, ray.dir, &all, borders, parts);
         }
-        let first = parts.len();
-        held::turn(ray.dir, &all, borders, ray.moves, parts);
-        let Weight { value: weight, gradient } = sum / (Weight::constant(1.0) + sum);
-        Some(RayTurn { weight, gradient, parts: first..parts.len(), chain: 0..0, shadow: None })
+        sum
     }
 
     /// Adds up the weights of edges beside a ray, and what they turn it by if these were divided by 1.

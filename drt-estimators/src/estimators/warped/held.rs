@@ -126,9 +126,16 @@ impl Around {
         from_fn(|k| ByU::new(v.dot(self.across[k]), from_fn(|j| if j == k { -along } else { 0.0 })))
     }
 
-    fn edge(&self, beside: &Beside, weight: ByU) -> Matrix {
-        let Some((normal, held)) = beside.held else { return Matrix::even(weight) };
-        let held = self.weight(held);
+    /// W of an edge as seen from a point.
+    fn edge(&self, from: Vec3, Found { edge, beside, weight }: &Found<'_>) -> Matrix {
+        let weight = self.weight(*weight);
+        let Some(normal) = beside.normal else { return Matrix::even(weight) };
+        let [to_a, to_b] = edge.ends.map(|end| square_to(end - from, self.dir));
+        let nearer = if to_a.value < to_b.value { to_a } else { to_b };
+        if nearer.value == 0.0 {
+            return Matrix::even(weight);
+        }
+        let held = self.weight(beside.square / nearer);
         let sine = self.dot(normal);
         let inv = (ByU::from(1.0) - sine * sine).sqrt().recip();
         let n = self.coordinates(normal).map(|c| c * inv);
@@ -137,6 +144,7 @@ impl Around {
         matrix
     }
 
+    /// v b bᵀ of a border.
     fn border(&self, border: &Border) -> Matrix {
         let Border { axis, forward, weight } = *border;
         // The normal of the plane of all directions with this coordinate is axis - coordinate forward.
@@ -147,6 +155,7 @@ impl Around {
         Matrix::across(n, self.weight(weight) * inv)
     }
 
+    /// A rate by a vector, and its divergence.
     fn part(&self, rate: [[ByU; 2]; 2]) -> (Mat3, Vec3) {
         let [s, t] = self.across;
         let column = |c: f64, d: f64| s * c + t * d;
@@ -160,6 +169,17 @@ impl Around {
     }
 }
 
+/// Squared sine of the angle between the unit direction ω and a place; 1 from a right angle on.
+fn square_to(place: Vec3, w: Vec3) -> Weight {
+    let end = place.normalize();
+    let cosine = end.dot(w);
+    if cosine <= 0.0 {
+        return Weight::constant(1.0);
+    }
+    let value = end.cross(w).length_squared();
+    Weight { value, gradient: (end - w * cosine) * (-2.0 * cosine) }
+}
+
 /// An edge that has a weight.
 pub(super) struct Found<'a> {
     pub(super) edge: &'a TurningEdge,
@@ -167,18 +187,18 @@ pub(super) struct Found<'a> {
     pub(super) weight: Weight,
 }
 
-/// Adds the summands of the rate of a ray along `dir` beside edges and the borders of its pixel.
+/// Adds the summands of the rate of a ray that leaves a point at rest along `dir`, beside edges and the borders of its pixel.
 pub(super) fn turn(
+    from: Vec3,
     dir: Vec3,
     found: &[Found<'_>],
     borders: &[Border],
-    viewer_moves: bool,
     parts: &mut Vec<TurnPart>,
 ) {
     let value = |f: &Found<'_>| f.weight.value;
-    let strongest = found.iter().filter(|f| f.beside.held.is_some());
+    let strongest = found.iter().filter(|f| f.beside.normal.is_some());
     let strongest = strongest.max_by(|a, b| value(a).total_cmp(&value(b)));
-    let of_edge = strongest.and_then(|f| Some((f.beside.held?.0, value(f))));
+    let of_edge = strongest.and_then(|f| Some((f.beside.normal?, value(f))));
     let of_border = borders.iter().map(|b| {
         let coordinate = b.axis.dot(dir) / b.forward.dot(dir);
         (b.axis - b.forward * coordinate, b.weight.value)
@@ -189,35 +209,23 @@ pub(super) fn turn(
     for border in borders {
         matrix.add(&around.border(border));
     }
-    let matrices: Vec<Matrix> =
-        found.iter().map(|f| around.edge(&f.beside, around.weight(f.weight))).collect();
+    let matrices: Vec<Matrix> = found.iter().map(|f| around.edge(from, f)).collect();
     for one in &matrices {
         matrix.add(one);
     }
     let inverse = matrix.inverse();
-    let mut resting = None;
     for (Found { edge, beside, .. }, one) in found.iter().zip(&matrices) {
-        let near = around.weight(beside.distance).recip();
-        if edge.moves {
-            let along = around.weight(beside.along);
-            for (end, part) in [ByU::from(1.0) - along, along].into_iter().enumerate() {
-                if part.re == 0.0 && part.eps == [0.0; 2] {
-                    continue;
-                }
-                let (rate, divergence) = around.part(inverse.times(&one.scaled(part * near)));
-                let part = |matter| TurnPart { matter: Some(matter), rate, divergence };
-                parts.extend(edge.matter(end).map(part));
-            }
-        } else if viewer_moves {
-            let own = one.scaled(near);
-            match &mut resting {
-                None => resting = Some(own),
-                Some(sum) => sum.add(&own),
-            }
+        if !edge.moves {
+            continue;
         }
-    }
-    if let Some(resting) = resting {
-        let (rate, divergence) = around.part(inverse.times(&resting));
-        parts.push(TurnPart { matter: None, rate, divergence });
+        let (near, along) = (around.weight(beside.distance).recip(), around.weight(beside.along));
+        for (end, part) in [ByU::from(1.0) - along, along].into_iter().enumerate() {
+            if part.re == 0.0 && part.eps == [0.0; 2] {
+                continue;
+            }
+            let (rate, divergence) = around.part(inverse.times(&one.scaled(part * near)));
+            let part = |matter| TurnPart { matter: Some(matter), rate, divergence };
+            parts.extend(edge.matter(end).map(part));
+        }
     }
 }

@@ -140,12 +140,8 @@ impl VelocityField for EdgeTurns {
             return None;
         }
         let (angle, rest) = around(world, ray);
-        match borders(world, ray) {
-            Some(borders) if !self.camera_moves => {
-                self.edges.turn_held(ray, angle, &borders, always, parts)
-            }
-            _ => self.edges.turn(ray, angle, rest, always, parts),
-        }
+        let borders = borders(world, ray).filter(|_| !self.camera_moves);
+        self.edges.turn(ray, angle, rest, borders, always, parts)
     }
 
     fn turn_with_chain(
