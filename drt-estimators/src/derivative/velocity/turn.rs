@@ -23,7 +23,7 @@ use core::ops::Range;
 use drt_math::{Mat3, Vec3};
 
 use crate::derivative::velocity::{
-    Blend, EdgeMatter, Link, Mover, RayBehind, ShadowPart, ShadowTurn,
+    Blend, EdgeMatter, Link, Mover, RayBehind, ShadowPart, ShadowTurn, Weight,
 };
 use crate::sampling::record::CameraRay;
 use crate::world::vertex::{SurfacePoint, Vertex};
@@ -38,6 +38,14 @@ pub(crate) struct TurnPart {
     pub(crate) rate: Mat3,
     /// What its dot product with w gives to div T. 1 / scene units.
     pub(crate) divergence: Vec3,
+}
+
+impl TurnPart {
+    /// The summand times a weight that depends on the direction.
+    pub(crate) fn scaled(&self, by: Weight) -> Self {
+        let divergence = self.divergence * by.value + self.rate.transpose_mul(by.gradient);
+        Self { matter: self.matter, rate: self.rate * by.value, divergence }
+    }
 }
 
 /// A summand of the rate of a ray's direction that comes from something past a smooth surface, or from such a surface.

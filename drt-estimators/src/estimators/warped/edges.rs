@@ -20,6 +20,17 @@ use crate::model::scene::{Scene, Shape};
 use crate::world::World;
 use crate::world::vertex::{SurfacePoint, Vertex};
 
+/// What keeps a ray from turning with the edges beside it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    /// Farther away edges have no weight.
+    pub(super) angle: f64,
+    /// The weight, beside 1, of what does not turn.
+    pub(super) rest: Weight,
+    /// In place of that, the borders of a pixel, where edges are followed across [alone](super::held).
+    pub(super) borders: Option<[Border; 2]>,
+}
+
 /// The edges of a scene in trees of spheres.
 #[derive(Debug, Default)]
 pub(super) struct TurningEdges {
@@ -114,7 +125,7 @@ impl TurningEdges {
         (!slopes.is_empty()).then(|| corners.map(|v| slopes[v as usize]))
     }
 
-    fn near(&self, ray: &TurningRay<'_>, angle: f64) -> Near {
+    pub(super) fn near(&self, ray: &TurningRay<'_>, angle: f64) -> Near {
         let alike = |s: &SurfacePoint| {
             ray.tangent_plane.is_some() || (ray.emission_alone && self.emission_turns_apart(s))
         };
@@ -169,32 +180,28 @@ impl TurningEdges {
         any.is_break()
     }
 
-    /// How edges within an `angle` of a ray turn it, besides what does not turn with a weight of `rest` beside 1; across [alone](super::held) with
-    /// the `borders` of a pixel in place of that. Without any
-    /// that moves, unless `always` or the viewer moves, they do not.
+    /// How the edges beside a ray turn it. Without any that moves, unless `always` or the viewer moves, they do not.
     pub(super) fn turn(
         &self,
         ray: &TurningRay<'_>,
-        angle: f64,
-        rest: Weight,
-        borders: Option<[Border; 2]>,
+        limits: &Limits,
         always: bool,
         parts: &mut Vec<TurnPart>,
     ) -> Option<RayTurn> {
-        let near = self.near(ray, angle);
+        let near = self.near(ray, limits.angle);
         if !(ray.moves || always || self.any_moves_near(&near)) {
             return None;
         }
         let first = parts.len();
-        let (sum, rest) = match &borders {
+        let (sum, rest) = match &limits.borders {
             Some(borders) => (self.gather_held(&near, ray, borders, parts), Weight::default()),
-            None => (self.gather(&near, ray.moves, parts), rest),
+            None => (self.gather(&near, ray.moves, parts), limits.rest),
         };
         if sum.value == 0.0 {
             return None;
         }
         let total = Weight::constant(1.0) + sum + rest;
-        if borders.is_none() {
+        if limits.borders.is_none() {
             divide(&mut parts[first..], ray.dir, total);
         }
         let Weight { value: weight, gradient } = sum / total;
@@ -202,7 +209,7 @@ impl TurningEdges {
     }
 
     /// Adds up the weights of edges beside a ray of a camera at rest, and what turns it across these and the borders of its pixel.
-    fn gather_held(
+    pub(super) fn gather_held(
         &self,
         near: &Near,
         ray: &TurningRay<'_>,

@@ -1,4 +1,13 @@
 //! Rays that turn with the [shadows](crate::derivative::velocity::ShadowTurn) of points and directions.
+//!
+//! Where a pixel has borders, a ray beside no shadow has the rate T_e that follows edges [across alone](super::held). Beside shadows it has
+//!
+//! ```text
+//! T = s T_w + (1 - s) T_e,    s = W / (1 + W),
+//! ```
+//!
+//! T_w being the mean of all rates by the weights of edges, shadows and borders, and W the weight of shadows. Both rates are right at edges and
+//! at borders, and s rises to 1 at shadows and falls to 0 where their weight ends, so that T is right at all of them and continuous.
 
 use alloc::boxed::Box;
 
@@ -8,7 +17,7 @@ use crate::derivative::velocity::{
     RayTurn, ShadowPart, ShadowPlace, ShadowTurn, TurnParts, TurningRay, Weight,
 };
 use crate::estimators::warped::beside::Beside;
-use crate::estimators::warped::edges::{TurningEdges, divide};
+use crate::estimators::warped::edges::{Limits, TurningEdges, divide};
 use crate::estimators::warped::near::{ANGLE, Near};
 use crate::world::lights::{LightKind, LightSample};
 use crate::world::vertex::SurfacePoint;
@@ -82,11 +91,11 @@ impl TurningEdges {
         &self,
         ray: &TurningRay<'_>,
         flow: &Flow,
-        angle: f64,
-        rest: Weight,
+        limits: &Limits,
         moves: bool,
         parts: &mut TurnParts,
     ) -> Option<RayTurn> {
+        let Limits { angle, rest, borders } = *limits;
         let TurnParts { edges, shadows } = parts;
         let [first, first_shadow] = [edges.len(), shadows.len()];
         let mut any = moves || ray.moves;
@@ -116,11 +125,23 @@ impl TurningEdges {
         let turned = self.gather_beside(ray, angle, edges);
         let total = Weight::constant(1.0) + turned + rest + weight;
         divide(&mut edges[first..], ray.dir, total);
-        for part in &mut shadows[first_shadow..] {
-            part.share = part.share / total;
+        let mut scale = Weight::constant(1.0) / total;
+        let mut sum = (turned + weight) / total;
+        if let Some(borders) = borders {
+            let one = Weight::constant(1.0);
+            let part = weight / (one + weight);
+            edges[first..].iter_mut().for_each(|edge| *edge = edge.scaled(part));
+            let across = edges.len();
+            let held = self.gather_held(&self.near(ray, angle), ray, &borders, edges);
+            edges[across..].iter_mut().for_each(|edge| *edge = edge.scaled(one - part));
+            scale = scale * part;
+            sum = sum * part + held / (one + held) * (one - part);
         }
-        let shadow = ShadowTurn { at: *place, weight: weight / total, by_light: by_light / total };
-        let Weight { value: weight, gradient } = (turned + weight) / total;
+        for part in &mut shadows[first_shadow..] {
+            part.share = part.share * scale;
+        }
+        let shadow = ShadowTurn { at: *place, weight: weight * scale, by_light: by_light * scale };
+        let Weight { value: weight, gradient } = sum;
         Some(RayTurn {
             weight,
             gradient,

@@ -11,7 +11,7 @@ use crate::derivative::velocity::{
     TurnParts, TurningRay, VelocityField, VertexVelocity, Weight,
 };
 use crate::estimators::warped::behind::TurnedBehind;
-use crate::estimators::warped::edges::{TurningEdges, divide};
+use crate::estimators::warped::edges::{Limits, TurningEdges, divide};
 use crate::estimators::warped::held::Border;
 use crate::estimators::warped::near::ANGLE;
 use crate::estimators::warped::shadows::Flow;
@@ -83,6 +83,30 @@ impl EdgeTurns {
             None => Blend::of_distance(dir, distance, curvature / NEAR),
         })
     }
+
+    fn limits(&self, world: &World, ray: &TurningRay<'_>) -> Limits {
+        let (angle, rest) = around(world, ray);
+        Limits { angle, rest, borders: self.borders(world, ray) }
+    }
+
+    /// The borders of the pixel that a ray is in, if it starts at a camera at rest whose filter jumps there.
+    fn borders(&self, world: &World, ray: &TurningRay<'_>) -> Option<[Border; 2]> {
+        let has_borders = world.camera.has_borders() && !self.camera_moves;
+        let CameraRay { pixel, lens } = ray.of_camera.filter(|_| has_borders)?;
+        let camera = &*world.camera.at_lens(lens);
+        let view = camera.view(camera.position() + ray.dir);
+        let Pinhole { right, up, forward, .. } = *camera.pinhole();
+        let border = |k: usize, axis: Vec3| {
+            let (window, slope) = camera.window_along(pixel, view.pixel, k);
+            let mut slopes = [0.0; 2];
+            slopes[k] = slope;
+            let (slope, _) = camera.view_gradient(&view, slopes, 0.0);
+            let gradient = slope.reject(ray.dir) * (-2.0 / (window * window * window));
+            let weight = Weight { value: 1.0 / (window * window) - 1.0, gradient };
+            Border { axis, forward, weight }
+        };
+        Some([border(0, right), border(1, up)])
+    }
 }
 
 impl VelocityField for EdgeTurns {
@@ -139,9 +163,7 @@ impl VelocityField for EdgeTurns {
         if !(ray.moves || always || self.edges.any_moves()) {
             return None;
         }
-        let (angle, rest) = around(world, ray);
-        let borders = borders(world, ray).filter(|_| !self.camera_moves);
-        self.edges.turn(ray, angle, rest, borders, always, parts)
+        self.edges.turn(ray, &self.limits(world, ray), always, parts)
     }
 
     fn turn_with_chain(
@@ -190,9 +212,9 @@ impl VelocityField for EdgeTurns {
         if !(ray.moves || light_moves || self.edges.any_moves()) {
             return None;
         }
-        let (angle, rest) = around(world, ray);
-        let flow = Flow::new(ray, ray.end?, light, angle, world.geometry.radius)?;
-        self.edges.turn_with_shadows(ray, &flow, angle, rest, light_moves, parts)
+        let limits = self.limits(world, ray);
+        let flow = Flow::new(ray, ray.end?, light, limits.angle, world.geometry.radius)?;
+        self.edges.turn_with_shadows(ray, &flow, &limits, light_moves, parts)
     }
 
     fn blend(
@@ -206,24 +228,6 @@ impl VelocityField for EdgeTurns {
         self.of_matter(world, None, end, dir, distance)
             .unwrap_or_else(|| self.spatial.blend(world, viewer, end, dir, distance))
     }
-}
-
-/// The borders of the pixel that a ray of the camera is in, if a filter jumps there.
-fn borders(world: &World, ray: &TurningRay<'_>) -> Option<[Border; 2]> {
-    let CameraRay { pixel, lens } = ray.of_camera.filter(|_| world.camera.has_borders())?;
-    let camera = &*world.camera.at_lens(lens);
-    let view = camera.view(camera.position() + ray.dir);
-    let Pinhole { right, up, forward, .. } = *camera.pinhole();
-    let border = |k: usize, axis: Vec3| {
-        let (window, slope) = camera.window_along(pixel, view.pixel, k);
-        let mut slopes = [0.0; 2];
-        slopes[k] = slope;
-        let (slope, _) = camera.view_gradient(&view, slopes, 0.0);
-        let gradient = slope.reject(ray.dir) * (-2.0 / (window * window * window));
-        let weight = Weight { value: 1.0 / (window * window) - 1.0, gradient };
-        Border { axis, forward, weight }
-    };
-    Some([border(0, right), border(1, up)])
 }
 
 /// Within which angle edges turn a ray, and the weight of what does not turn with it.
