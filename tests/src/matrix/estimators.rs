@@ -111,6 +111,8 @@ pub struct Pair {
     pub faults: Vec<Fault>,
     /// Contributions that were no numbers.
     pub non_finite: u64,
+    /// The largest share that a single sample of either has in its second moment.
+    pub largest_share: f64,
 }
 
 impl Pair {
@@ -283,6 +285,7 @@ fn pairs_of(stage: &'static str, method: Method, own: &Sampled, reference: &Samp
             faults: terms.iter().zip(&a.terms).filter_map(plant).collect(),
             terms,
             non_finite: own.all.non_finite,
+            largest_share: f64::max(a.total.tail.share(), b.total.tail.share()),
         });
     }
     pairs
@@ -380,6 +383,7 @@ impl fmt::Display for Pairs<'_> {
                 let unclear = if fault.must_be_seen { "" } else { " (in noise)" };
                 write!(f, "; {} × -1: {:.1}{unclear}", fault.term.name(), fault.rms_z)?;
             }
+            write!(f, "; largest sample {:.0} %", 100.0 * pair.largest_share)?;
             writeln!(f, "{}", if pair.passes() { "" } else { "  <<< FAILS" })?;
         }
         Ok(())

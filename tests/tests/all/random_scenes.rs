@@ -1,10 +1,11 @@
 //! Derivatives by all estimators beside each other, on scenes put together at random and on bodies across the borders of pixels.
 //!
-//! All of them, `DRT_COUNT` random scenes from number `DRT_FIRST` on (500 from 0), `DRT_SAMPLES` per pixel (256):
+//! All of them, `DRT_COUNT` random scenes from number `DRT_FIRST` on (500 from 0), `DRT_SAMPLES` per pixel (512):
 //! `cargo test --release -p drt-tests --test all -- --ignored random_scenes:: --nocapture`
 
 use drt_estimators::EstimatorKind::{PathSpace, Radiative, Warped};
 use drt_estimators::PathSampling::Bidirectional;
+use drt_estimators::Tail;
 use drt_tests::Result;
 use drt_tests::matrix::Stage;
 use drt_tests::matrix::estimators::{Effort, Method, Pair, Pairs, compare};
@@ -66,6 +67,11 @@ fn agrees(pair: &Pair) -> bool {
     pair.agreement.agrees && pair.scale.z() <= 4.0 && pair.non_finite == 0
 }
 
+/// Whether the program says of one of the two that single samples are much of its second moment, and its error not to be trusted.
+fn is_told(pair: &Pair) -> bool {
+    pair.largest_share > Tail::HEAVY
+}
+
 /// The planted faults that the noise lets one see, and how many of them a comparison sees.
 fn faults(pairs: &[Pair]) -> [usize; 2] {
     let clear = pairs.iter().flat_map(|pair| pair.faults.iter().filter(|f| f.must_be_seen));
@@ -73,13 +79,15 @@ fn faults(pairs: &[Pair]) -> [usize; 2] {
 }
 
 fn assert_all_agree(pairs: &[Pair]) {
-    let failing = pairs.iter().filter(|pair| !agrees(pair)).count();
+    let (told, failing): (Vec<&Pair>, Vec<&Pair>) =
+        pairs.iter().filter(|pair| !agrees(pair)).partition(|pair| is_told(pair));
     let [planted, seen] = faults(pairs);
+    let [all, told, failing] = [pairs.len(), told.len(), failing.len()];
     println!(
-        "{} derivatives, {failing} disagree; {seen} of {planted} planted faults seen",
-        pairs.len()
+        "{all} derivatives, {failing} disagree, {told} with a heavy tail; {seen} of {planted} planted faults seen"
     );
-    assert_eq!(failing, 0, "{failing} of {} derivatives disagree", pairs.len());
+    assert_eq!(failing, 0, "{failing} of {all} derivatives disagree");
+    assert!(100 * told <= all, "{told} of {all} derivatives have a heavy tail");
     assert!(seen > 0 && seen == planted, "{seen} of {planted} planted faults seen");
 }
 
@@ -141,5 +149,5 @@ fn a_sheet_on_a_floor_where_fog_begins() {
 #[ignore = "an hour"]
 fn five_hundred_random_scenes() {
     let first = number("DRT_FIRST", 0.0) as u32;
-    at_random(first..first + number("DRT_COUNT", 500.0) as u32, effort(256));
+    at_random(first..first + number("DRT_COUNT", 500.0) as u32, effort(512));
 }
