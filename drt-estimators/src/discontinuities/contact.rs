@@ -219,6 +219,14 @@ impl Contact {
         self.floor[usize::from(self.side.dot(w) < 0.0)]
     }
 
+    /// A point of the edge, moved off the floor by more than the two may be apart: to where the faces are, or, of a sheet in the floor's
+    /// plane, to where it is seen from along `w`.
+    pub(crate) fn off_the_floor(&self, edge: &Edge, x: Vec3, w: Vec3) -> Vec3 {
+        let gap = 2.0 * GAP * edge.wedge.length;
+        let below = self.two_sided && self.up.dot(w) < 0.0;
+        x + self.up * if below { -gap } else { gap }
+    }
+
     /// The direction and distance from the contact to the point from which it is seen.
     pub(crate) fn towards(&self, eye_of: impl Fn(Vec3) -> Vec3) -> Option<(Vec3, f64)> {
         let x = self.floor.iter().flatten().next()?.x;

@@ -71,20 +71,19 @@ impl<'a> EdgeView<'a> {
         })
     }
 
-    /// Transmittance to the viewer, if nothing blocks.
+    /// Transmittance to the viewer, if nothing blocks. By rounding, an edge that rests on a surface may lie under it.
     pub(super) fn open(&self, tracer: &mut Tracer<'_>) -> Option<Rgb> {
+        let contact = self.discontinuity.contact(tracer.world, self.along);
+        let x =
+            contact.map_or(self.x, |c| c.off_the_floor(&self.discontinuity.edge, self.x, self.w));
+        let to = self.viewer.x - x;
+        let distance = to.length();
+        let w = to / distance;
         let mut ray = core::mem::take(&mut tracer.shadow);
         let Tracer { world, rng, counters, .. } = tracer;
-        let open = world.connect_past(
-            self.x,
-            self.own_faces,
-            self.medium,
-            self.w,
-            self.distance,
-            &mut ray,
-            counters,
-        );
-        let tau = open.then(|| world.transmittance(&Ray::new(self.x, self.w), &ray, rng, counters));
+        let faces = self.own_faces;
+        let open = world.connect_past(x, faces, self.medium, w, distance, &mut ray, counters);
+        let tau = open.then(|| world.transmittance(&Ray::new(x, w), &ray, rng, counters));
         tracer.shadow = ray;
         tau.filter(|t| !t.is_zero())
     }
