@@ -26,6 +26,8 @@ pub(super) struct TurningEdge {
     pub(super) facets: bool,
     /// Between faces of a smooth body with interpolated normals, where light jumps at silhouettes alone.
     pub(super) untracked: bool,
+    /// The shape that it is of, or one of them where surfaces intersect.
+    pub(super) shape: u32,
     /// The shape of both faces of a crease that rests on no other surface.
     pub(super) within: Option<u32>,
     /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
@@ -55,7 +57,20 @@ impl TurningEdge {
         // What rests on another surface may end there.
         let within = edges.shape_of_faces(world, edge).filter(|_| !edge.edge.may_rest);
         let untracked = facets && within.is_some_and(|shape| is_untracked(world, shape));
-        Self { ends, half, points, of_both, moves, on_border, facets, untracked, within, crease }
+        let shape = edge.edge.shape;
+        Self {
+            ends,
+            half,
+            points,
+            of_both,
+            moves,
+            on_border,
+            facets,
+            untracked,
+            shape,
+            within,
+            crease,
+        }
     }
 
     /// How one of its ends moves.

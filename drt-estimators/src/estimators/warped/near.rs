@@ -37,8 +37,8 @@ pub(super) struct Near {
     /// from its plane.
     normal: Vec3,
     depth: f64,
-    /// How far the ray goes, where it ends on facets whose planes do not count.
-    length: Option<Weight>,
+    /// How far the ray goes, where it ends on facets whose planes do not count, and the shape of these.
+    length: Option<(Weight, u32)>,
     /// The tangent plane there, in place of both.
     tangent_plane: Option<TangentPlane>,
     /// The shape where the ray ends, if creases of it count.
@@ -51,7 +51,8 @@ pub(super) struct Near {
 
 impl Near {
     /// Prepares the weights of edges beside a ray. `creases_of` is the shape where it ends, if radiance may jump at creases of that; `facets` tells that this is a
-    /// curved one. With `by_length` it counts how far an edge is beyond the end of the ray, and not how far behind the plane there.
+    /// curved one. With `by_length` it counts how far an edge is beyond the end of the ray, and not how far behind the plane there, and edges of the shape itself count
+    /// wherever they are.
     pub(super) fn of_ray(
         ray: &TurningRay<'_>,
         angle: f64,
@@ -80,9 +81,9 @@ impl Near {
             normal,
             // At creases that do not count, what is behind must not jump with the plane.
             tangent_plane: ray.tangent_plane,
-            length: end.filter(|_| by_length).map(|_| {
+            length: end.filter(|_| by_length).map(|s| {
                 let gradient = normal.reject(dir) * (-distance / normal.dot(dir));
-                Weight { value: distance, gradient }
+                (Weight { value: distance, gradient }, s.shape)
             }),
             // Nothing is behind the sky.
             depth: if end.is_some() { normal.dot(dir) * distance } else { 0.0 },
@@ -128,9 +129,10 @@ impl Near {
         }
     }
 
-    /// How far the nearest point of an edge, which goes from one end along a `side`, is behind the plane of the surface where the
-    /// ray ends, or farther away than that.
-    fn behind(&self, beside: &Beside, side: Vec3) -> Weight {
+    /// How far the nearest point of an edge is behind the plane of the surface where the ray ends, or farther away than that; zero of edges that count
+    /// wherever they are.
+    fn behind(&self, edge: &TurningEdge, beside: &Beside) -> Weight {
+        let side = edge.ends[1] - edge.ends[0];
         if let Some(TangentPlane { normal, place, by_direction }) = self.tangent_plane {
             let beyond = beside.place + self.from - place;
             let mut gradient = beside.along.gradient * normal.dot(side);
@@ -140,7 +142,9 @@ impl Near {
             return Weight { value: normal.dot(beyond), gradient };
         }
         match self.length {
-            Some(length) => beside.distance - length,
+            // Where a facet is seen edge-on, the distance to its silhouette would change over a short way.
+            Some((_, shape)) if edge.shape == shape => Weight::default(),
+            Some((length, _)) => beside.distance - length,
             None => {
                 let value = self.normal.dot(beside.place) - self.depth;
                 Weight { value, gradient: beside.along.gradient * self.normal.dot(side) }
@@ -196,7 +200,7 @@ impl Near {
         let least = f64::MIN_POSITIVE.sqrt();
         // The weights of many short edges add up to what that of one line has where they are.
         let part = Weight::constant(f64::min(self.seen_length(ends) / long, 1.0));
-        let behind = self.behind(&beside, b - a);
+        let behind = self.behind(edge, &beside);
         // Of an edge that is not hidden the weight diverges where the ray meets it.
         if behind.value <= 0.0 {
             let square = Weight { value: f64::max(square.value, least), ..square };

@@ -272,6 +272,43 @@ fn lamps_of_facets() {
     }
 }
 
+/// Beside the outline of a lamp of few facets, some of which are seen nearly edge-on, rates change gradually: a ray does not follow the card
+/// before the lamp right up to the outline.
+#[test]
+fn rates_rise_gradually_from_outlines() {
+    let motion = parameter("card", 0.0, alloc::vec![moves("card", shift())]);
+    let lit = EmitterMask::Extended;
+    let black = || diffuse(0.0, 0.0, 0.0);
+    let glow = Emitter::Area { radiance: Rgb::new(4.0, 3.0, 5.0) };
+    let ball = ball(0.35, vec3(0.1, 0.7, 0.0));
+    let card = placed(procedural::cube(), vec3(0.3, 0.1, 0.02), 0.5, vec3(0.3, 0.7, 0.6));
+    let scene = SceneBuilder::new()
+        .shape("ball", ShapeBuilder::new(ball, black()).emitter(glow))
+        .shape("card", ShapeBuilder::new(card, black()));
+    let scene = seen(scene, [vec3(0.3, 0.9, 4.0), vec3(0.1, 0.7, 0.0)], 4);
+    let (prepared, _) = prepare_lit(EstimatorKind::Warped, lit, &scene, &motion, 4);
+    let c = vec3(0.6, 0.3, 0.1);
+    let (mut last, mut steps) = (None, 0);
+    for row in 0..50 {
+        for k in 0..6000 {
+            let point = [f64::from(k) * 1e-3, f64::from(row) * 0.1];
+            let (pixel, dir) = held::seen_at(&prepared, point);
+            let end = held::asked(&prepared, pixel, dir, |_, ray| Some(ray.end?.shape));
+            let rate = held::rate(&prepared, pixel, dir, c).unwrap_or_default().0;
+            if let Some((shape, before)) = last
+                && end == Some(0)
+                && shape == end
+            {
+                steps += u32::from(before != Vec3::ZERO);
+                let step = (rate - before).length();
+                assert!(step < 0.01, "{step} at {point:?}: {before:?} {rate:?}");
+            }
+            last = Some((end, rate));
+        }
+    }
+    assert!(steps > 1000, "{steps}");
+}
+
 /// The rate of rays from many places to a lamp does not jump at its creases, whether its light does or not: what is scattered on the way
 /// there sees the rate.
 #[test]

@@ -11,7 +11,7 @@ use crate::sampling::record::CameraRay;
 use crate::world::lights::LightTable;
 
 /// What is told of the ray of a camera at rest.
-fn asked<R>(
+pub(super) fn asked<R>(
     prepared: &Prepared,
     pixel: [u32; 2],
     dir: Vec3,
@@ -42,7 +42,12 @@ fn by_edges(parts: &[TurnPart], dir: Vec3, c: Vec3) -> (Vec3, f64) {
 }
 
 /// The rate of a ray of the camera of which all that is beside it moves by `c`, and its divergence.
-fn rate(prepared: &Prepared, pixel: [u32; 2], dir: Vec3, c: Vec3) -> Option<(Vec3, f64)> {
+pub(super) fn rate(
+    prepared: &Prepared,
+    pixel: [u32; 2],
+    dir: Vec3,
+    c: Vec3,
+) -> Option<(Vec3, f64)> {
     asked(prepared, pixel, dir, |world, ray| {
         let (mut parts, mut probe) = (Vec::new(), Probe::new(Rng::new(0, 0, 0)));
         prepared.terms.velocity.turn(world, ray, &mut probe, &mut parts)?;
@@ -87,7 +92,7 @@ fn everything_moves(filter: FilterKind) -> Prepared {
 }
 
 /// The pixel of an image point, and the direction in which that is seen.
-fn seen_at(prepared: &Prepared, point: [f64; 2]) -> ([u32; 2], Vec3) {
+pub(super) fn seen_at(prepared: &Prepared, point: [f64; 2]) -> ([u32; 2], Vec3) {
     let dir = prepared.world.camera.ray(point).dir;
     (point.map(|x| x as u32), dir)
 }
