@@ -5,7 +5,7 @@
 
 use drt_estimators::EstimatorKind::{PathSpace, Radiative, Warped};
 use drt_estimators::PathSampling::Bidirectional;
-use drt_estimators::Tail;
+use drt_estimators::{Agreement, Tail};
 use drt_tests::Result;
 use drt_tests::matrix::Stage;
 use drt_tests::matrix::estimators::{Effort, Method, Pair, Pairs, compare};
@@ -67,9 +67,11 @@ fn agrees(pair: &Pair) -> bool {
     pair.agreement.agrees && pair.scale.z() <= 4.0 && pair.non_finite == 0
 }
 
-/// Whether the program says of one of the two that single samples are much of its second moment, and its error not to be trusted.
+/// Whether the program says of one of the two that single samples are much of its second moment, so that its errors are not to be trusted, and
+/// the two disagree by no more than these may be off where such a sample is.
 fn is_told(pair: &Pair) -> bool {
-    pair.largest_share > Tail::HEAVY
+    let Agreement { rms_z, max_z, .. } = pair.agreement;
+    pair.largest_share > Tail::HEAVY && rms_z <= 1.3 && max_z < 6.0
 }
 
 /// The planted faults that the noise lets one see, and how many of them a comparison sees.
