@@ -57,8 +57,12 @@ fn feet_may_lie_under_the_floor_by_rounding() {
         let by = |gap: f64| {
             let estimator = EstimatorKind::Radiative;
             let settings = Settings { estimator, seed: 4, ..Settings::default() };
-            let mut all =
-                rendered(&box_moved_by(vec3(-1.0, gap, 0.0)), &[parameter.clone()], &settings, 16);
+            let mut all = rendered(
+                &box_moved_by(vec3(-1.0, gap, 0.0)),
+                core::slice::from_ref(&parameter),
+                &settings,
+                16,
+            );
             all.derivatives.remove(0).total
         };
         let on_it = by(0.0);

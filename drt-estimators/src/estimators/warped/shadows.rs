@@ -8,6 +8,9 @@
 //!
 //! T_w being the mean of all rates by the weights of edges, shadows and borders, and W the weight of shadows. Both rates are right at edges and
 //! at borders, and s rises to 1 at shadows and falls to 0 where their weight ends, so that T is right at all of them and continuous.
+//!
+//! A shadow that lies exactly along the border of a pixel, as in symmetric scenes, leaves one pixel for the other at the full rate: the weight of borders is divided
+//! by one more than that of such shadows, and diverges where these end.
 
 use alloc::boxed::Box;
 
@@ -19,28 +22,32 @@ use crate::derivative::velocity::{
 use crate::estimators::warped::beside::Beside;
 use crate::estimators::warped::edges::{Limits, TurningEdges, divide};
 use crate::estimators::warped::near::{ANGLE, Near};
+use crate::model::sensor::Sensor;
+use crate::world::World;
 use crate::world::lights::{LightKind, LightSample};
 use crate::world::vertex::SurfacePoint;
 
 /// The flow of a light to a point on a surface.
-pub(super) struct Flow {
+pub(super) struct Flow<'a> {
     place: ShadowPlace,
+    /// The camera, of a ray that starts there, if its filter has borders.
+    camera: Option<&'a Sensor>,
     near: Near,
     /// How far the point moves across the flow to each radian of the light's view, in scene units.
     range: f64,
     at_infinity: bool,
 }
 
-impl Flow {
+impl<'a> Flow<'a> {
     /// To where a ray ends, at the surface point `s`. Shadows count within a distance of what the ray sees within an `angle`
-    /// there, and within [`ANGLE`] as seen by the light, which at infinity is taken as seen from the distance `scale`. `None`
+    /// there, and within [`ANGLE`] as seen by the light, which at infinity is taken as seen from the distance of the scene's radius. `None`
     /// for emitters with an area.
     pub(super) fn new(
+        world: &'a World,
         ray: &TurningRay<'_>,
         s: &SurfacePoint,
         light: &LightSample,
         angle: f64,
-        scale: f64,
     ) -> Option<Self> {
         let at_infinity = match light.kind {
             LightKind::Area(_) | LightKind::Environment => return None,
@@ -50,7 +57,7 @@ impl Flow {
         let flow = -light.w;
         let side = if s.ng.dot(flow) < 0.0 { -1.0 } else { 1.0 };
         let normal = s.ng * side;
-        let range = if at_infinity { scale } else { light.distance };
+        let range = if at_infinity { world.geometry.radius } else { light.distance };
         let inv_range = if at_infinity { 0.0 } else { 1.0 / range };
         let TurningRay { dir, distance, .. } = *ray;
         let x = ray.viewer.x + dir * distance;
@@ -65,7 +72,22 @@ impl Flow {
         let near = Near::of_flow(x, flow, range, at_infinity, normal, square);
         let place =
             ShadowPlace { matter: s.material(), normal, side, dir, distance, flow, inv_range };
-        Some(Self { place, near, range, at_infinity })
+        let sees_borders = ray.of_camera.is_some() && world.camera.has_borders();
+        let camera = sees_borders.then_some(&world.camera);
+        Some(Self { place, camera, near, range, at_infinity })
+    }
+
+    /// Whether the shadow of the straight line between two points on the plane of the surface is seen along a border between pixels.
+    fn falls_on_border(&self, ends: [Vec3; 2]) -> bool {
+        let ShadowPlace { normal, flow, dir, distance, .. } = self.place;
+        self.camera.is_some_and(|camera| {
+            let x = camera.position() + dir * distance;
+            let from = x - flow * self.range;
+            camera.sees_on_border(ends.map(|end| {
+                let along = if self.at_infinity { flow } else { end - from };
+                end + along * (normal.dot(x - end) / normal.dot(along))
+            }))
+        })
     }
 
     /// How far the shadow of a point beside the flow goes with the point, and how far with the light, with gradients by the place
@@ -90,7 +112,7 @@ impl TurningEdges {
     pub(super) fn turn_with_shadows(
         &self,
         ray: &TurningRay<'_>,
-        flow: &Flow,
+        flow: &Flow<'_>,
         limits: &Limits,
         moves: bool,
         parts: &mut TurnParts,
@@ -99,7 +121,7 @@ impl TurningEdges {
         let TurnParts { edges, shadows } = parts;
         let [first, first_shadow] = [edges.len(), shadows.len()];
         let mut any = moves || ray.moves;
-        let [mut weight, mut by_light] = [Weight::default(); 2];
+        let [mut weight, mut by_light, mut on_border] = [Weight::default(); 3];
         let place = &flow.place;
         let by_direction = |w: Weight| w.map_gradient(|g| place.by_direction(g));
         self.visit(&flow.near, |edge, beside, of_edge| {
@@ -108,6 +130,9 @@ impl TurningEdges {
             let [with_edge, with_light] = flow.cast(beside, b - a);
             let own = by_place(of_edge);
             weight += by_direction(own);
+            if flow.falls_on_border(edge.ends) {
+                on_border += by_direction(own);
+            }
             by_light += by_direction(own * with_light);
             if edge.moves {
                 any = true;
@@ -123,6 +148,7 @@ impl TurningEdges {
             return None;
         }
         let turned = self.gather_beside(ray, angle, edges);
+        let rest = rest / (Weight::constant(1.0) + on_border);
         let total = Weight::constant(1.0) + turned + rest + weight;
         divide(&mut edges[first..], ray.dir, total);
         let mut scale = Weight::constant(1.0) / total;

@@ -213,7 +213,7 @@ impl VelocityField for EdgeTurns {
             return None;
         }
         let limits = self.limits(world, ray);
-        let flow = Flow::new(ray, ray.end?, light, limits.angle, world.geometry.radius)?;
+        let flow = Flow::new(world, ray, ray.end?, light, limits.angle)?;
         self.edges.turn_with_shadows(ray, &flow, &limits, light_moves, parts)
     }
 

@@ -242,3 +242,35 @@ fn shadows_join_what_is_beside_none() {
     }
     assert!(joined > 20 && compared > 1000, "{joined} {compared}");
 }
+
+/// A card out of view, whose edge casts a shadow on a floor exactly along the border between two columns of pixels.
+fn shadow_along_a_border() -> Scene {
+    let grey = || diffuse(0.6, 0.5, 0.4);
+    let up = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
+    let floor =
+        procedural::grid(2, 2).transform(&Affine { linear: up, translation: vec3(0.0, -1.0, 0.0) });
+    let card = Affine { linear: up * 0.125, translation: vec3(-0.5, 1.5, 0.0) };
+    let card = procedural::rectangle().transform(&card);
+    let bulb = Emitter::Point { position: vec3(0.0, 3.0, 0.1), intensity: Rgb::splat(9.0) };
+    let scene = SceneBuilder::new()
+        .shape("floor", ShapeBuilder::new(floor, grey()))
+        .shape("card", ShapeBuilder::new(card, grey()))
+        .emitter("bulb", bulb);
+    let mut scene = seen(scene, [Vec3::Z, Vec3::ZERO], 2);
+    let filter = Filter::new(FilterKind::BOX).expect("a valid filter");
+    let (origin, target) = (vec3(0.0, 0.6, 3.5), vec3(0.0, -1.0, 0.0));
+    let sensor = Sensor::look_at([origin, target, Vec3::Y], Lens::with_fov(30.0), FILM, filter);
+    scene.sensors[0].item.sensor = sensor.expect("a valid camera");
+    scene
+}
+
+/// What moves from one pixel into the next is all that moves.
+#[test]
+fn shadows_may_lie_along_borders() {
+    let motion = parameter("card", 0.0, alloc::vec![moves("card", shift())]);
+    let by = |kind| prepare_lit(kind, EmitterMask::Delta, &shadow_along_a_border(), &motion, 2);
+    let sum = Sum { samples: 1024, ..LIGHT };
+    let reference = derivative(sum, &by(EstimatorKind::PathSpace));
+    let (errors, part) = derivative(sum, &by(EstimatorKind::Warped)).off(&reference);
+    assert!(errors.abs() < 4.0 && part < 0.03, "{errors} standard errors of {part}");
+}
