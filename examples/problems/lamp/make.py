@@ -10,7 +10,7 @@ sys.path.insert(0, str(HERE.parent))
 import assets  # noqa: E402
 import views  # noqa: E402
 
-HEIGHT = 1.7
+HEIGHT = 1.3
 VIEWS, SPP, LEVELS = 40, 64, 5
 
 
