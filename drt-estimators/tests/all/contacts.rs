@@ -3,7 +3,7 @@
 
 use crate::common::*;
 use drt_estimators::{
-    EstimatorKind, Rendering, Scene, SceneBuilder, Settings, ShapeBuilder, Tail, Unattended,
+    EstimatorKind, Layer, Rendering, Scene, SceneBuilder, Settings, ShapeBuilder, Tail, Unattended,
     agreement, finite_differences,
 };
 use drt_geom::procedural;
@@ -49,22 +49,25 @@ fn what_is_chosen_where_bodies_slide_or_part() {
     }
 }
 
+/// The derivative of a box at another place on the floor, and off it or in it by a gap.
+fn of_box_at(gap: f64, estimator: EstimatorKind, spp: u32, parameter: &Parameter) -> Layer {
+    let settings = Settings { estimator, seed: 4, ..Settings::default() };
+    let scene = box_moved_by(vec3(-1.0, gap, 0.0));
+    let mut all = rendered(&scene, core::slice::from_ref(parameter), &settings, spp);
+    all.derivatives.remove(0).total
+}
+
 /// The radiance at the foot of a lit face is discontinuous, wherever rounding puts the foot.
 #[test]
 fn feet_may_lie_under_the_floor_by_rounding() {
-    let camera = || vec![moves("camera", GeometryChange::Translate(vec3(0.4, 0.2, -0.3)))];
-    for parameter in [parameter("camera moves", 0.0, camera()), slides()] {
-        let by = |gap: f64| {
-            let estimator = EstimatorKind::Radiative;
-            let settings = Settings { estimator, seed: 4, ..Settings::default() };
-            let mut all = rendered(
-                &box_moved_by(vec3(-1.0, gap, 0.0)),
-                core::slice::from_ref(&parameter),
-                &settings,
-                16,
-            );
-            all.derivatives.remove(0).total
-        };
+    let camera = vec![moves("camera", GeometryChange::Translate(vec3(0.4, 0.2, -0.3)))];
+    let camera = parameter("camera moves", 0.0, camera);
+    let [own, other] = [(EstimatorKind::Radiative, 256), (EstimatorKind::PathSpace, 1024)]
+        .map(|(kind, spp)| of_box_at(0.0, kind, spp, &camera));
+    let found = agreement(&own, &other, None);
+    assert!(found.agrees, "{found:?}");
+    for parameter in [camera, slides()] {
+        let by = |gap| of_box_at(gap, EstimatorKind::Radiative, 16, &parameter);
         let on_it = by(0.0);
         for gap in [-1e-9, -1e-15, 1e-9] {
             let pairs = by(gap).blocks.into_iter().zip(&on_it.blocks);

@@ -68,10 +68,11 @@ fn agrees(pair: &Pair) -> bool {
 }
 
 /// Whether the program says of one of the two that single samples are much of its second moment, so that its errors are not to be trusted, and
-/// the two disagree by no more than these may be off where such a sample is.
+/// the two disagree by no more than these may be off where such a sample is: in one block, and not as a whole.
 fn is_told(pair: &Pair) -> bool {
     let Agreement { rms_z, max_z, .. } = pair.agreement;
-    pair.largest_share > Tail::HEAVY && rms_z <= 1.3 && max_z < 6.0
+    let as_a_whole = rms_z <= 1.3 && pair.scale.z() <= 4.0 && pair.non_finite == 0;
+    pair.largest_share > Tail::HEAVY && as_a_whole && max_z < 6.0
 }
 
 /// The planted faults that the noise lets one see, and how many of them a comparison sees.

@@ -228,16 +228,12 @@ impl TurningEdges {
     }
 
     /// Adds up the weights of edges beside a ray, and what they turn it by if these were divided by 1.
-    pub(super) fn gather_beside(
+    pub(super) fn gather(
         &self,
-        ray: &TurningRay<'_>,
-        angle: f64,
+        near: &Near,
+        viewer_moves: bool,
         parts: &mut Vec<TurnPart>,
     ) -> Weight {
-        self.gather(&self.near(ray, angle), ray.moves, parts)
-    }
-
-    fn gather(&self, near: &Near, viewer_moves: bool, parts: &mut Vec<TurnPart>) -> Weight {
         let mut sum = Weight::default();
         let mut resting = Weight::default();
         self.visit(near, |edge, beside, weight| {

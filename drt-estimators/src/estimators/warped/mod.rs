@@ -46,8 +46,8 @@
 //! on both sides of its creases, though the light that it scatters jumps. Emission and scattering are summands of a
 //! path's value, and each has a field of its own. For [emission](crate::derivative::adjoint), as next-event estimation
 //! and rays that hit an emitter find it, creases of the emitter do not count, and s depends on how far beyond the end
-//! of the ray the nearest point of an edge is, because the planes of facets jump at creases. For the emitter's own edges s is 1: on facets that are seen
-//! nearly edge-on, beside a silhouette, s would rise from 0 to 1 within their narrow width.
+//! of the ray the nearest point of an edge is, because the planes of facets jump at creases. So it is of shapes at whose creases nothing jumps.
+//! For edges of the shape itself s is then 1: on facets that are seen nearly edge-on, beside a silhouette, it would rise from 0 to 1 within their narrow width.
 //!
 //! | requirement (theory sheet §9) | why it holds |
 //! |---|---|

@@ -147,7 +147,8 @@ impl TurningEdges {
         if !(any && weight.value > 0.0) {
             return None;
         }
-        let turned = self.gather_beside(ray, angle, edges);
+        let near = self.near(ray, angle);
+        let turned = self.gather(&near, ray.moves, edges);
         let rest = rest / (Weight::constant(1.0) + on_border);
         let total = Weight::constant(1.0) + turned + rest + weight;
         divide(&mut edges[first..], ray.dir, total);
@@ -158,7 +159,7 @@ impl TurningEdges {
             let part = weight / (one + weight);
             edges[first..].iter_mut().for_each(|edge| *edge = edge.scaled(part));
             let across = edges.len();
-            let held = self.gather_held(&self.near(ray, angle), ray, &borders, edges);
+            let held = self.gather_held(&near, ray, &borders, edges);
             edges[across..].iter_mut().for_each(|edge| *edge = edge.scaled(one - part));
             scale = scale * part;
             sum = sum * part + held / (one + held) * (one - part);

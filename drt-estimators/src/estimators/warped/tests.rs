@@ -20,7 +20,9 @@ use crate::derivative::velocity::{
     TurningRay, VelocityField, VertexVelocity, Weight,
 };
 use crate::model::emitter::Emitter;
+use crate::model::filter::{Filter, FilterKind};
 use crate::model::scene::Scene;
+use crate::model::sensor::{Lens, Sensor};
 use crate::model::settings::EstimatorKind;
 use crate::model::surface::Bsdf;
 use crate::terms::prepared::Prepared;
@@ -144,6 +146,16 @@ impl VelocityField for Faulty {
     fn blend(&self, world: &World, viewer: &Vertex, end: &Vertex, dir: Vec3, d: f64) -> Blend {
         self.field.blend(world, viewer, end, dir, d)
     }
+}
+
+/// The scene of a builder, to a depth of two, as a camera at a point sees it that looks at another one through a filter.
+fn seen_through(filter: FilterKind, scene: SceneBuilder, place: [Vec3; 2]) -> Scene {
+    let mut scene = seen(scene, place, 2);
+    let filter = Filter::new(filter).expect("a valid filter");
+    let [origin, target] = place;
+    let sensor = Sensor::look_at([origin, target, Vec3::Y], Lens::with_fov(40.0), FILM, filter);
+    scene.sensors[0].item.sensor = sensor.expect("a valid camera");
+    scene
 }
 
 fn compare(scene: &Scene, motion: &Parameter, sum: Sum, faults: &[Fault]) {

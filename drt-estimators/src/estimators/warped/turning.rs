@@ -184,7 +184,8 @@ impl VelocityField for EdgeTurns {
             return None;
         }
         let first = [parts.len(), chained.len()];
-        let beside = self.edges.gather_beside(start, angle, parts);
+        let near = self.edges.near(start, angle);
+        let beside = self.edges.gather(&near, start.moves, parts);
         let all = behind.by_u(&beside) + behind.sum;
         if all.re == 0.0 {
             return None;

@@ -5,6 +5,7 @@ use drt_geom::edges::EdgeSides;
 use drt_math::{Ray, Rgb, Vec3};
 
 use crate::derivative::velocity::blend::Blends;
+use crate::discontinuities::contact::Contact;
 use crate::discontinuities::discontinuity_edge::DiscontinuityEdge;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
@@ -14,7 +15,6 @@ use crate::world::vertex::{Kind, Matter, Vertex};
 /// An edge point and a viewer of it.
 pub(super) struct EdgeView<'a> {
     pub(super) discontinuity: &'a DiscontinuityEdge,
-    along: f64,
     /// The edge point.
     pub(super) x: Vec3,
     /// Unit, to the viewer.
@@ -23,6 +23,8 @@ pub(super) struct EdgeView<'a> {
     pub(super) sides: EdgeSides,
     medium: Option<usize>,
     own_faces: [u32; 2],
+    /// What the edge rests on there.
+    contact: Option<Contact>,
     viewer: &'a Vertex,
     blends: &'a Blends,
 }
@@ -59,13 +61,13 @@ impl<'a> EdgeView<'a> {
         let medium = discontinuity.medium(tracer.world, &sides, x, w, w);
         Some(Self {
             discontinuity,
-            along,
             x,
             w,
             distance,
             sides,
             medium,
             own_faces,
+            contact: discontinuity.contact(tracer.world, along),
             viewer,
             blends: &spatial.blends,
         })
@@ -73,9 +75,9 @@ impl<'a> EdgeView<'a> {
 
     /// Transmittance to the viewer, if nothing blocks. By rounding, an edge that rests on a surface may lie under it.
     pub(super) fn open(&self, tracer: &mut Tracer<'_>) -> Option<Rgb> {
-        let contact = self.discontinuity.contact(tracer.world, self.along);
-        let x =
-            contact.map_or(self.x, |c| c.off_the_floor(&self.discontinuity.edge, self.x, self.w));
+        let edge = &self.discontinuity.edge;
+        let off_the_floor = |contact: &Contact| contact.off_the_floor(edge, self.x, self.w);
+        let x = self.contact.as_ref().map_or(self.x, off_the_floor);
         let to = self.viewer.x - x;
         let distance = to.length();
         let w = to / distance;
@@ -111,7 +113,7 @@ impl<'a> EdgeView<'a> {
                 let vertex = Vertex { x, medium: self.medium, kind: Kind::Surface(point) };
                 self.from(tracer, vertex, self.distance)
             }
-            None => match self.discontinuity.contact(tracer.world, self.along) {
+            None => match &self.contact {
                 Some(contact) => {
                     let floor = contact.floor_along(self.sides.outward());
                     floor

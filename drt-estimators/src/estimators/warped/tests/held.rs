@@ -5,8 +5,7 @@ use core::array::from_fn;
 use super::levels::before;
 use super::*;
 use crate::derivative::tests::scenes::FILM;
-use crate::model::filter::{Filter, FilterKind};
-use crate::model::sensor::{Lens, Sensor};
+use crate::model::filter::FilterKind;
 use crate::sampling::record::CameraRay;
 use crate::world::lights::LightTable;
 
@@ -173,22 +172,16 @@ fn crossings_are_even() {
 /// A slab above a floor, whose outline and whose shadows by a bulb and by the sun are in the same pixels.
 fn over_a_floor() -> Prepared {
     let grey = || diffuse(0.6, 0.5, 0.4);
-    let up = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
-    let floor =
-        procedural::grid(2, 2).transform(&Affine { linear: up, translation: vec3(0.0, -1.0, 0.0) });
     let slab = placed(procedural::cube(), vec3(0.5, 0.2, 0.4), 0.5, vec3(0.1, -0.75, 0.2));
     let bulb = Emitter::Point { position: vec3(-0.3, 2.3, 0.4), intensity: Rgb::ONE };
     let sun = Emitter::Directional { direction: vec3(0.3, -1.0, -0.3), irradiance: Rgb::ONE };
     let scene = SceneBuilder::new()
-        .shape("floor", ShapeBuilder::new(floor, grey()))
+        .shape("floor", ShapeBuilder::new(floor(), grey()))
         .shape("slab", ShapeBuilder::new(slab, grey()))
         .emitter("bulb", bulb)
         .emitter("sun", sun);
-    let mut scene = seen(scene, [Vec3::Z, Vec3::ZERO], 2);
-    let filter = Filter::new(FilterKind::BOX).expect("a valid filter");
-    let (origin, target) = (vec3(0.3, 0.6, 3.5), vec3(0.0, -0.9, 0.0));
-    let sensor = Sensor::look_at([origin, target, Vec3::Y], Lens::with_fov(40.0), FILM, filter);
-    scene.sensors[0].item.sensor = sensor.expect("a valid camera");
+    let place = [vec3(0.3, 0.6, 3.5), vec3(0.0, -0.9, 0.0)];
+    let scene = seen_through(FilterKind::BOX, scene, place);
     let motion = parameter("slab", 0.0, alloc::vec![moves("slab", shift())]);
     prepare_lit(EstimatorKind::Warped, EmitterMask::Delta, &scene, &motion, 2).0
 }
@@ -246,22 +239,15 @@ fn shadows_join_what_is_beside_none() {
 /// A card out of view, whose edge casts a shadow on a floor exactly along the border between two columns of pixels.
 fn shadow_along_a_border() -> Scene {
     let grey = || diffuse(0.6, 0.5, 0.4);
-    let up = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
-    let floor =
-        procedural::grid(2, 2).transform(&Affine { linear: up, translation: vec3(0.0, -1.0, 0.0) });
-    let card = Affine { linear: up * 0.125, translation: vec3(-0.5, 1.5, 0.0) };
+    let up = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 0.5;
+    let card = Affine { linear: up, translation: vec3(-0.5, 1.5, 0.0) };
     let card = procedural::rectangle().transform(&card);
     let bulb = Emitter::Point { position: vec3(0.0, 3.0, 0.1), intensity: Rgb::splat(9.0) };
     let scene = SceneBuilder::new()
-        .shape("floor", ShapeBuilder::new(floor, grey()))
+        .shape("floor", ShapeBuilder::new(floor(), grey()))
         .shape("card", ShapeBuilder::new(card, grey()))
         .emitter("bulb", bulb);
-    let mut scene = seen(scene, [Vec3::Z, Vec3::ZERO], 2);
-    let filter = Filter::new(FilterKind::BOX).expect("a valid filter");
-    let (origin, target) = (vec3(0.0, 0.6, 3.5), vec3(0.0, -1.0, 0.0));
-    let sensor = Sensor::look_at([origin, target, Vec3::Y], Lens::with_fov(30.0), FILM, filter);
-    scene.sensors[0].item.sensor = sensor.expect("a valid camera");
-    scene
+    seen_through(FilterKind::BOX, scene, [vec3(0.0, 0.6, 4.5), vec3(0.0, -1.0, 0.0)])
 }
 
 /// What moves from one pixel into the next is all that moves.

@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::derivative::tests::scenes::FILM;
-use crate::model::filter::{Filter, FilterKind};
-use crate::model::sensor::{Lens, Sensor};
+use crate::model::filter::FilterKind;
 use crate::sampling::parallel::Pool;
 use crate::terms::level::Levels;
 
@@ -23,13 +22,7 @@ pub(super) fn before(filter: FilterKind, under_sky: bool) -> Scene {
         let lamp = procedural::rectangle().transform(&facing);
         scene.shape("lamp", glowing(lamp, Rgb::splat(5.0)))
     };
-    let place = [vec3(0.2, 0.4, 4.0), Vec3::ZERO];
-    let mut scene = seen(scene, place, 2);
-    let filter = Filter::new(filter).expect("a valid filter");
-    let [origin, target] = place;
-    let sensor = Sensor::look_at([origin, target, Vec3::Y], Lens::with_fov(40.0), FILM, filter);
-    scene.sensors[0].item.sensor = sensor.expect("a valid camera");
-    scene
+    seen_through(filter, scene, [vec3(0.2, 0.4, 4.0), Vec3::ZERO])
 }
 
 /// The pixel in the middle of the ball.
