@@ -15,7 +15,7 @@ use crate::world::vertex::SurfacePoint;
 use crate::world::{SurroundingMedium, World};
 
 /// How much less radiance jumps at a crease of a surface with interpolated normals than its angle tells.
-const SMOOTH: f64 = 0.05;
+const SMOOTH: f64 = 0.2;
 
 /// How much less from behind: next to black, and hidden by the front of what is closed.
 const BEHIND: f64 = 0.05;
@@ -149,6 +149,12 @@ impl DiscontinuityEdges {
         let [a, b] = &self.faces_of_fans[discontinuity.fan.clone()] else { return None };
         let [sa, sb] = [a, b].map(|f| world.geometry.prim(f.face).shape);
         (sa == sb).then_some(sa)
+    }
+
+    /// True of an edge of a mesh whose two faces belong to the same mesh.
+    pub(crate) fn is_of_one_mesh(&self, world: &World, discontinuity: &DiscontinuityEdge) -> bool {
+        let faces = self.shape_of_faces(world, discontinuity);
+        faces.is_some_and(|shape| discontinuity.edge.shapes().all(|s| s == shape))
     }
 
     /// True of a crease whose two faces show their fronts on the same side.

@@ -129,8 +129,8 @@ impl Terms {
         active: &ActiveInputs,
     ) -> Result<(), Error> {
         if let Some(flux) = &flux {
-            self.grazing = GrazingFlux::new(world, flux, active)?;
-            self.sources.extend(self.grazing.as_ref().map(|_| BoundarySource::GrazingFlux));
+            self.grazing_flux = GrazingFlux::new(world, flux, active)?;
+            self.sources.extend(self.grazing_flux.as_ref().map(|_| BoundarySource::GrazingFlux));
         }
         self.flux = flux;
         Ok(())

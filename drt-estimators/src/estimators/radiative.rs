@@ -11,6 +11,9 @@
 //!   homogeneous media most of it is taken in by vertices that surfaces [warped](crate::derivative::velocity::warp);
 //! * in direction, at [edges](crate::terms::edge_queries) that vertices see (D19.23).
 //!
+//! The camera finds few points of what it sees [edge on](crate::terms::grazing), and these move far on their surfaces: paths that begin
+//! there are sampled by area.
+//!
 //! Cost is linear in path length: of all vertices of a path one queries an edge, and of all surfaces met one
 //! is asked for its flux; each traces side paths that
 //! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
@@ -24,6 +27,7 @@ use alloc::sync::Arc;
 
 use crate::derivative::medium_motion::Insides;
 use crate::derivative::velocity::Spatial;
+use crate::derivative::velocity::warp::GRAZED;
 use crate::discontinuities::speeds::speeds;
 use crate::estimators::{Changes, Estimator};
 use crate::model::error::Error;
@@ -32,8 +36,16 @@ use crate::model::settings::Settings;
 use crate::terms::boundary_source::BoundarySource;
 use crate::terms::edge_queries::{QueryRate, SeenEdges};
 use crate::terms::flux::Flux;
+use crate::terms::grazing::GrazingTriangles;
 use crate::terms::selected::Terms;
 use crate::world::World;
+
+/// The cosine of the angle of incidence below which points that the camera sees are drawn by area, over the cosine below which they have
+/// a blend weight. Facets have the first, and interpolated normals the second, which differs from it by the angles between facets.
+const BLENDED: f64 = 1.5;
+
+/// The largest such cosine, for shapes that are small in the image.
+const MOST: f64 = 0.1;
 
 /// Vertices move with the rays that find them, and ask for the edges that they see.
 pub(crate) struct Radiative;
@@ -72,6 +84,11 @@ pub(crate) fn terms_of(
     let sweeps = active.moves_geometry() || active.grids.contains(&true);
     let flux = sweeps.then(|| Flux::spatial(world, active, &spatial)).flatten();
     let mut terms = Terms::interior(Arc::clone(&spatial) as _);
+    let below = |s: u32| match active.sensor || active.shapes[s as usize] {
+        true => f64::clamp(BLENDED * spatial.blends.cosine_in_view(s), GRAZED, MOST),
+        false => 0.0,
+    };
+    terms.grazing = GrazingTriangles::new(world, below)?;
     let edges = match motion {
         Some(motion) => SeenEdges::new(world, active, spatial, speeds(motion, world))?,
         None => SeenEdges::new(world, active, spatial, |_| 1.0)?,
@@ -91,5 +108,6 @@ pub(crate) fn terms_of(
     terms.edges = Some(edges);
     terms.lobe_pairs = settings.antithetic;
     terms.add_flux(world, flux, active)?;
+    terms.sources.extend(terms.grazing.as_ref().map(|_| BoundarySource::GrazingPaths));
     Ok(terms)
 }

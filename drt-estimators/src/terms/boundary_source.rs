@@ -14,6 +14,8 @@ pub(crate) enum BoundarySource {
     PrimaryEdges,
     /// The flux through what the camera sees edge on.
     GrazingFlux,
+    /// Paths that begin on what the camera sees edge on.
+    GrazingPaths,
     /// Light paths that are connected to the camera.
     LightPaths,
 }
@@ -25,7 +27,7 @@ impl BoundarySource {
             Self::Edges(Strategy::Direct) => Term::Direct,
             Self::Edges(Strategy::Indirect) => Term::Indirect,
             Self::GrazingFlux => Term::Flux,
-            Self::LightPaths => Term::Interior,
+            Self::GrazingPaths | Self::LightPaths => Term::Interior,
         }
     }
 
@@ -39,13 +41,18 @@ impl BoundarySource {
             Self::PrimaryEdges => 5,
             Self::GrazingFlux => 6,
             Self::LightPaths => 7,
+            Self::GrazingPaths => 8,
         };
         id << 40
     }
 
     /// Samples of it to one of other sources.
     pub(crate) fn part(self) -> f64 {
-        if self == Self::GrazingFlux { 0.0625 } else { 1.0 }
+        match self {
+            Self::GrazingFlux => 0.0625,
+            Self::GrazingPaths => 0.25,
+            _ => 1.0,
+        }
     }
 
     /// True for the edges that the camera sees.
@@ -55,11 +62,11 @@ impl BoundarySource {
 
     /// True for those whose first numbers may have a distribution that is learnt.
     pub(crate) fn is_guided(self) -> bool {
-        !matches!(self, Self::GrazingFlux | Self::LightPaths)
+        !matches!(self, Self::GrazingFlux | Self::GrazingPaths | Self::LightPaths)
     }
 
     /// True when no sample counts much more than others.
     pub(crate) fn is_even(self) -> bool {
-        matches!(self, Self::PrimaryEdges | Self::GrazingFlux)
+        matches!(self, Self::PrimaryEdges | Self::GrazingFlux | Self::GrazingPaths)
     }
 }

@@ -99,6 +99,7 @@ impl Guiding {
             BoundarySource::Edges(Strategy::Indirect) => "indirect boundary",
             BoundarySource::Borders => "pixel borders",
             BoundarySource::GrazingFlux => "grazing flux",
+            BoundarySource::GrazingPaths => "paths that begin edge on",
             BoundarySource::LightPaths => "light paths",
         };
         let Some((learnt, samples)) = self.outcome() else {

@@ -1,6 +1,7 @@
 //! The interior term, and the plain forward image: one pixel sample at a time.
 
 mod component;
+mod grazing;
 mod probe;
 mod recorder;
 
@@ -11,6 +12,7 @@ use drt_math::{Rgb, Rng};
 
 pub(crate) use crate::terms::interior::component::Component;
 use crate::terms::interior::component::{Traced, Worker};
+pub(crate) use crate::terms::interior::grazing::GrazingPaths;
 pub(crate) use crate::terms::interior::probe::Probes;
 pub(crate) use crate::terms::interior::recorder::{PathView, Recorder};
 
@@ -183,7 +185,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     pub(crate) fn finish(self) -> (Account, Vec<S>) {
         let sum = |of: fn(&Worker<'a, S>) -> u64| self.workers.iter().map(of).sum();
         let of_paths = self.views.iter().map(|v| v.velocities.probe());
-        let probes = of_paths.chain(self.workers.iter().map(|w| w.differentiator.probe()));
+        let probes = of_paths.chain(self.workers.iter().map(|w| w.derivative.sweep.probe()));
         let [rays, turning_edges] = probes
             .fold([0; 2], |[rays, edges], probe| [rays + probe.rays, edges + probe.turning_edges]);
         let account = Account {

@@ -4,6 +4,7 @@ pub(crate) mod boundary_segments;
 pub(crate) mod boundary_source;
 pub(crate) mod edge_queries;
 pub(crate) mod flux;
+pub(crate) mod grazing;
 pub(crate) mod guiding;
 pub(crate) mod interior;
 pub(crate) mod level;

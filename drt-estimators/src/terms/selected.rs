@@ -10,6 +10,7 @@ use crate::terms::boundary_segments::Boundary;
 use crate::terms::boundary_source::BoundarySource;
 use crate::terms::edge_queries::{QueryRate, SeenEdges};
 use crate::terms::flux::{Flux, GrazingFlux};
+use crate::terms::grazing::GrazingTriangles;
 
 /// A velocity of the vertices of paths, and the terms that go with it. The interior term is always there; each of the others
 /// is prepared where it can contribute.
@@ -26,7 +27,9 @@ pub(crate) struct Terms {
     /// What sweeps over the insides of media that do not follow it.
     pub(crate) flux: Option<Flux>,
     /// The flux through what the camera sees edge on.
-    pub(crate) grazing: Option<GrazingFlux>,
+    pub(crate) grazing_flux: Option<GrazingFlux>,
+    /// What the camera sees edge on, if the interior of paths that begin there is sampled apart.
+    pub(crate) grazing: Option<GrazingTriangles>,
     /// Where light paths start, if there are any.
     pub(crate) emission: Option<EmissionSampler>,
     /// What is sampled apart from the paths of pixels.
@@ -50,6 +53,7 @@ impl Terms {
             edges: None,
             queries: QueryRate::default(),
             flux: None,
+            grazing_flux: None,
             grazing: None,
             emission: None,
             sources: Vec::new(),

@@ -16,6 +16,7 @@ use crate::terms::boundary_segments;
 use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::boundary_source::BoundarySource;
 use crate::terms::flux;
+use crate::terms::interior::GrazingPaths;
 use crate::terms::light_paths::LightPaths;
 use crate::terms::selected::Terms;
 use crate::world::World;
@@ -62,14 +63,17 @@ impl Splatter<'_> {
         receiver: &mut Checked<R>,
         mut observe: impl FnMut(&mut R, &Drawn, u64, u64),
     ) -> Account {
-        let from_light = source == BoundarySource::LightPaths;
-        let mut tracer = Tracer::new(if from_light { self.all } else { self.world });
+        let of_paths = source.term() == Term::Interior;
+        let mut tracer = Tracer::new(if of_paths { self.all } else { self.world });
         let mut edges = boundary_segments::Buffers::default();
         let mut functional = VelocityFunctional::default();
-        let mut grazing = flux::Buffers::default();
-        let emission = self.terms.emission.as_ref().filter(|_| from_light);
+        let mut flux = flux::Buffers::default();
+        let emission = self.terms.emission.as_ref().filter(|_| of_paths);
         let mut light_paths =
             emission.map(|emission| LightPaths::new(self.all, emission, self.world, self.terms));
+        let grazing = self.terms.grazing.as_ref().filter(|_| of_paths);
+        let mut grazing_paths =
+            grazing.map(|seen| GrazingPaths::new(self.all, seen, self.world, self.terms));
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;
@@ -105,8 +109,13 @@ impl Splatter<'_> {
                     }
                 }
                 BoundarySource::GrazingFlux => {
-                    if let Some(seen) = &self.terms.grazing {
-                        seen.sample(&mut tracer, &mut grazing, receiver);
+                    if let Some(seen) = &self.terms.grazing_flux {
+                        seen.sample(&mut tracer, &mut flux, receiver);
+                    }
+                }
+                BoundarySource::GrazingPaths => {
+                    if let Some(paths) = &mut grazing_paths {
+                        paths.sample(&mut tracer, [self.seed, stream], index, receiver);
                     }
                 }
                 BoundarySource::LightPaths => {

@@ -20,6 +20,7 @@ use crate::model::settings::{EstimatorKind, Settings};
 use crate::sampling::pixels::Sampler;
 use crate::sampling::streams::sequence_name;
 use crate::terms::boundary_segments::BoundarySink;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::interior::PixelSampler;
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::Checked;
@@ -120,18 +121,22 @@ pub(crate) fn parts(
                 edges += values[2..].iter().map(|v| v.mean()).sum::<f64>() * weight;
             }
         }
-        let contraction = Contraction::new(&prepared.world, motion);
-        let mut primary = Checked::new(Total { contraction, weight, sum: 0.0 });
         for source in &prepared.terms.sources {
+            let contraction = Contraction::new(&prepared.world, motion);
+            let mut splatted = Checked::new(Total { contraction, weight, sum: 0.0 });
             prepared.splatter(&prepared.world, seed).run(
                 *source,
                 None,
                 source.stream(),
                 samples * PIXELS,
-                &mut primary,
+                &mut splatted,
             );
+            let part = match source {
+                BoundarySource::GrazingPaths => &mut rays,
+                _ => &mut edges,
+            };
+            *part += splatted.inner.sum / f64::from(samples * PIXELS);
         }
-        edges += primary.inner.sum / f64::from(samples * PIXELS);
         parts.rays.push(rays);
         parts.edges.push(edges);
     }

@@ -212,6 +212,11 @@ impl Blends {
         }
     }
 
+    /// Cosine of the angle of incidence below which φ > 0 for some vertices on a shape that the camera sees; 0 where there are none.
+    pub(crate) fn cosine_in_view(&self, shape: u32) -> f64 {
+        self.camera_cosines.get(shape as usize).copied().unwrap_or(0.0)
+    }
+
     /// φ of a vertex that the camera sees along the unit direction `dir` at a `distance`, but for the part that depends on
     /// the pixel.
     pub(crate) fn in_view(
@@ -222,7 +227,7 @@ impl Blends {
         distance: f64,
     ) -> Blend {
         let Kind::Surface(s) = &vertex.kind else { return Blend::default() };
-        let cosine = self.camera_cosines.get(s.shape as usize).copied().unwrap_or(0.0);
+        let cosine = self.cosine_in_view(s.shape);
         let is_far = world.camera.viewpoint().is_at_infinity();
         let apart = if is_far { f64::INFINITY } else { distance };
         graze(world, s, dir, apart, cosine)

@@ -1,5 +1,7 @@
 //! Edges seen from the camera (2019 paper, Eq. 41, at fixed image points).
 
+use drt_math::Rgb;
+
 use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
 use crate::sampling::importance::see;
 use crate::sampling::trace::Tracer;
@@ -34,12 +36,22 @@ impl SeenEdges {
         let n = view.sides.n;
         let mut terms = edge.velocity_terms(world, chosen.along, n);
         let edge = [terms.next(), terms.next()];
+        let held = [minus_light * -minus.blend, plus_light * -plus.blend];
         let of = |side: &SideRadiance| [side.matter.map(|m| VelocityTerm::of(m, n)), None];
-        let parts = [
-            (edge, view.distance, minus_light + plus_light, false),
-            (of(&minus), minus.distance, minus_light * -minus.blend, true),
-            (of(&plus), plus.distance, plus_light * -plus.blend, true),
-        ];
+        let nothing = (edge, view.distance, Rgb::ZERO, true);
+        // Both sides of a crease move with it, and what they tell cancels where it shows none.
+        let [plus_face, minus_face] = view.sides.faces.map(|face| face.is_some());
+        let is_crease = plus_face
+            && minus_face
+            && self.discontinuities.is_of_one_mesh(world, chosen.discontinuity);
+        let sides = match is_crease {
+            true => [(edge, view.distance, held[0] + held[1], true), nothing],
+            false => [
+                (of(&minus), minus.distance, held[0], true),
+                (of(&plus), plus.distance, held[1], true),
+            ],
+        };
+        let parts = [(edge, view.distance, minus_light + plus_light, false), sides[0], sides[1]];
         let width = camera.film()[0];
         let image_point = camera.view(x).pixel;
         for (matter, distance, value, held) in parts {

@@ -7,7 +7,7 @@ use drt_math::{Rgb, RgbVec, Rng};
 
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::{AntitheticPairs, PairedRadiance};
-use crate::derivative::sensitivity::{SurfaceAdjoint, VelocityTerm};
+use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::PathVelocities;
 use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
@@ -15,11 +15,43 @@ use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments::shadow;
 use crate::terms::edge_queries::{EdgeContribution, EdgeQuery, QueryRate, SeenEdges};
 use crate::terms::flux::FluxRay;
+use crate::terms::grazing::GrazingTriangles;
 use crate::terms::interior::PathSink;
 use crate::terms::interior::recorder::PathView;
 use crate::terms::level::Levels;
 use crate::terms::selected::Terms;
 use crate::world::{RayPath, World};
+
+/// The derivative of a recorded path, and of the pairs of rays that tell how lobes turn.
+pub(super) struct PathDerivative<'a> {
+    pub(super) sweep: Differentiator<'a>,
+    incoming: PairedRadiance,
+}
+
+impl<'a> PathDerivative<'a> {
+    pub(super) fn new(world: &'a World) -> Self {
+        Self { sweep: Differentiator::new(world), incoming: PairedRadiance::default() }
+    }
+
+    /// Sends the gradient of a record's value to a `sink`. `filter` is the gradient of the pixel's filter, over the density; `line` is for
+    /// line integrals.
+    pub(super) fn send<S: AdjointSink>(
+        &mut self,
+        tracer: &mut Tracer<'a>,
+        record: &PathRecord,
+        view: &PathView<'_>,
+        filter: [f64; 2],
+        line: Rng,
+        sink: &mut S,
+    ) {
+        let Self { sweep, incoming } = self;
+        let recorded = view.of(record);
+        sweep.differentiate(&recorded, filter, line, sink);
+        view.pairs.follow(tracer, incoming, |pair, chance, other| {
+            sweep.pair(&recorded, pair, chance, other, sink);
+        });
+    }
+}
 
 /// What one estimator differentiates of the paths through pixels.
 pub(crate) struct Component<'a, S> {
@@ -38,9 +70,8 @@ pub(super) struct Worker<'a, S> {
     pub(super) levels: &'a Levels,
     pub(super) queries: QueryRate,
     pub(super) sink: S,
-    pub(super) differentiator: Differentiator<'a>,
+    pub(super) derivative: PathDerivative<'a>,
     shadow_buffers: shadow::Buffers,
-    incoming: PairedRadiance,
     /// Of the edge tree.
     options: TreeScratch,
     separate: bool,
@@ -75,9 +106,8 @@ impl<'a, S: PathSink> Worker<'a, S> {
             levels,
             queries,
             sink,
-            differentiator: Differentiator::new(world),
+            derivative: PathDerivative::new(world),
             shadow_buffers: shadow::Buffers::default(),
-            incoming: PairedRadiance::default(),
             options: TreeScratch::default(),
             separate,
             differentiated: 0,
@@ -112,7 +142,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         if self.terms.velocity.follows_edges() && self.separate {
             let mut parts = [alloc::vec![Rgb::ZERO; n], alloc::vec![Rgb::ZERO; n]];
             for (at_rest, part) in [true, false].into_iter().zip(&mut parts) {
-                self.differentiator.edges_at_rest = at_rest;
+                self.derivative.sweep.edges_at_rest = at_rest;
                 self.interior(tracer, path, view, part);
             }
             let warp = next(true).start;
@@ -159,21 +189,18 @@ impl<'a, S: PathSink> Worker<'a, S> {
         view: &PathView<'_>,
         values: &mut [Rgb],
     ) {
-        let Self { sink, differentiator, incoming, levels, .. } = self;
-        if !sink.active().any() {
+        let Self { terms, sink, derivative, levels, .. } = self;
+        let left_out = |seen: &GrazingTriangles| seen.first_of(path.record).is_some();
+        if !sink.active().any() || terms.grazing.as_ref().is_some_and(left_out) {
             return;
         }
         // Rays that do not turn with edges have rates that jump there.
-        let turns = !differentiator.edges_at_rest;
-        differentiator.level = if turns { levels.of(path.pixel) } else { Rgb::ZERO };
+        let turns = !derivative.sweep.edges_at_rest;
+        derivative.sweep.level = if turns { levels.of(path.pixel) } else { Rgb::ZERO };
         self.differentiated += 1;
         let line = Rng::new(path.seed, LINE_STREAM | u64::from(path.pixel), path.unit);
         sink.begin();
-        let recorded = view.of(path.record);
-        differentiator.differentiate(&recorded, path.filter, line, sink);
-        view.pairs.follow(tracer, incoming, |pair, chance, other| {
-            differentiator.pair(&recorded, pair, chance, other, sink);
-        });
+        derivative.send(tracer, path.record, view, path.filter, line, sink);
         sink.finish(values);
     }
 
@@ -184,7 +211,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         view: &mut PathView<'a>,
         values: &mut [Rgb],
     ) {
-        let Self { sink, differentiator, .. } = self;
+        let Self { sink, derivative, .. } = self;
         let Some(mut flux) = view.flux.take() else { return };
         let recorded = view.of(path.record);
         flux.evaluate(tracer, |f, ray_of_flux, value| {
@@ -193,7 +220,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
             f.send(value, sink);
             let [origin, turn] = [ray_of_flux.origin, ray_of_flux.turn].map(|v| value.outer(v));
             let FluxRay { node, dir, turns, .. } = ray_of_flux;
-            differentiator.send_back_ray(&recorded, node, dir, turns, origin, turn, sink);
+            derivative.sweep.send_back_ray(&recorded, node, dir, turns, origin, turn, sink);
             sink.finish(values);
         });
         view.flux = Some(flux);
@@ -258,7 +285,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         let viewer = (e.viewer * share).outer(e.n);
         let at = SurfaceAdjoint::of_place(viewer);
         let none = RgbVec::ZERO;
-        self.differentiator.send_back(&view.of(record), e.node, at, none, none, sink);
+        self.derivative.sweep.send_back(&view.of(record), e.node, at, none, none, sink);
         sink.finish(&mut values[layer..layer + n]);
     }
 }
