@@ -119,7 +119,7 @@ def warped_box_filter(trial):
 @row("box_filter")
 def box_filter(trial):
     names = ["sphere_r8_point_box", "sphere_r8_point_tent", "cam_sphere_r8_lamp_box", "sphere_flat_box", "sf_1e-12"]
-    parts = [all_agree(trial, f"{name}.toml", THREE, "--spp", 2048) for name in names]
+    parts = [all_agree(trial, f"{name}.toml", THREE, "--spp", 8192) for name in names]
     return all(p[0] for p in parts), "; ".join(p[1] for p in parts)
 
 
