@@ -151,10 +151,9 @@ impl DiscontinuityEdges {
         (sa == sb).then_some(sa)
     }
 
-    /// True of an edge of a mesh whose two faces belong to the same mesh.
+    /// True of an edge whose two faces belong to its own mesh. Where surfaces intersect there is none, as each side moves by itself.
     pub(crate) fn is_of_one_mesh(&self, world: &World, discontinuity: &DiscontinuityEdge) -> bool {
-        let faces = self.shape_of_faces(world, discontinuity);
-        faces.is_some_and(|shape| discontinuity.edge.shapes().all(|s| s == shape))
+        discontinuity.edge.shapes().eq(self.shape_of_faces(world, discontinuity))
     }
 
     /// True of a crease whose two faces show their fronts on the same side.
