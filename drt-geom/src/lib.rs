@@ -41,8 +41,8 @@ pub use io::{
 pub use io::{TetFileError, TetFileErrorKind, decode_medit, decode_tetgen, read_tet_mesh};
 pub use mesh::{Mesh, MeshAttribute, MeshError};
 pub use query::{
-    BvhBuilder, BvhError, ClosestPoint, Hit, InstancePlacement, InstancedBvh, Skip, TriangleBvh,
-    coincide, nearest_point,
+    AlongSegment, BvhBuilder, BvhError, ClosestPoint, Hit, InstancePlacement, InstancedBvh, Skip,
+    TriangleBvh, coincide, nearest_point,
 };
 pub use tet::{
     ConformityError, SurfacePlace, TetLocator, TetMesh, TetMeshError, TetPoint, TetVertexOrigin,

@@ -18,7 +18,8 @@
 
 use core::f64::consts::{PI, TAU};
 
-use drt_geom::Skip;
+use drt_geom::edges::Wedge;
+use drt_geom::{AlongSegment, Skip};
 use drt_math::{Ray, Real, Vec3, fm};
 
 use crate::discontinuities::edge::{Edge, EdgePoint};
@@ -98,6 +99,15 @@ fn surface_under(world: &World, at: &EdgePoint<'_>, down: Vec3) -> Option<(Surfa
     let (below, x) = world.point(hit.prim, hit.bary);
     let flat = Real::abs(below.ng.dot(wedge.tangent)) <= FLAT;
     flat.then_some((below, x))
+}
+
+/// False where no triangle but an edge's own faces lies along it, so that no ray needs to look for one on which it rests: nearly
+/// everywhere.
+fn has_flat_neighbor(world: &World, e: &Edge) -> bool {
+    let Wedge { ends, length, faces, .. } = e.wedge;
+    // Half an edge's length tilted by the angle of a floor, beside the gap; twice both, for rounding.
+    let (reach, sine) = ((4.0 * GAP + FLAT) * length, 2.0 * FLAT);
+    world.geometry.may_lie_along(&AlongSegment { ends, reach, sine, except: faces })
 }
 
 /// The surface in whose plane the only face of an open edge lies, to within rounding, and which it hides: a lamp in a
@@ -195,6 +205,9 @@ impl Contact {
 
     /// True when an edge rests on something somewhere.
     pub(crate) fn anywhere(world: &World, e: &Edge) -> bool {
+        if !has_flat_neighbor(world, e) {
+            return false;
+        }
         let mut e = *e;
         e.may_rest = true;
         PROBES.into_iter().any(|u| Self::at(world, &EdgePoint::new(&e, u, 1.0)).is_some())

@@ -231,6 +231,16 @@ impl EdgeTable {
         let mut kept: Vec<(Edge, f64)> =
             edges.iter().map(|e| (*e, weight(e))).filter(|(e, w)| *w > 0.0 && matters(e)).collect();
         sort_by_likeness(&mut kept, |(e, _)| &e.wedge);
+        Self::of_sorted(kept)
+    }
+
+    /// Those of its edges that have positive weight, by another weight.
+    pub(crate) fn reweighted(&self, weight: impl Fn(&Edge) -> f64) -> Result<Option<Self>, Error> {
+        let weighted = self.edges.iter().map(|e| (*e, weight(e)));
+        Self::of_sorted(weighted.filter(|(_, w)| *w > 0.0).collect())
+    }
+
+    fn of_sorted(kept: Vec<(Edge, f64)>) -> Result<Option<Self>, Error> {
         if kept.is_empty() {
             return Ok(None);
         }

@@ -4,7 +4,7 @@ use alloc::collections::BTreeMap;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_geom::{BvhError, InstancePlacement, InstancedBvh, Mesh, TriangleBvh};
+use drt_geom::{AlongSegment, BvhError, InstancePlacement, InstancedBvh, Mesh, TriangleBvh};
 use drt_math::{Affine, Mat3, Vec3};
 
 use crate::model::error::Error;
@@ -47,7 +47,7 @@ pub(crate) struct Placed {
 }
 
 impl Geometry {
-    /// Prepares the surfaces of a scene, unless `known` has the same.
+    /// Prepares the surfaces of a scene, unless `known` has the same; where it has them elsewhere, its tree follows.
     pub(crate) fn new(scene: &Scene, known: Option<&Arc<Self>>) -> Result<Arc<Self>, Error> {
         if let Some(known) = known.filter(|k| k.is_of(scene)) {
             return Ok(known.clone());
@@ -68,7 +68,14 @@ impl Geometry {
                 prims.push(Prim { shape: i as u32, triangle: t });
             }
         }
-        let bvh = TriangleBvh::build(&soup).map_err(fail)?;
+        let bvh = match known.filter(|known| known.is_numbered_as(scene)) {
+            Some(known) => {
+                let mut bvh = known.bvh.triangles().clone();
+                bvh.refit(&soup).map(|()| bvh)
+            }
+            None => TriangleBvh::build(&soup),
+        };
+        let bvh = bvh.map_err(fail)?;
         let mut next = prims.len();
         // Shared as meshes are.
         let mut trees: BTreeMap<*const Mesh, Arc<TriangleBvh>> = BTreeMap::new();
@@ -117,10 +124,23 @@ impl Geometry {
 
     fn is_of(&self, scene: &Scene) -> bool {
         let same = |(own, shape): (&Arc<Mesh>, &Shape)| own.same_triangles(&shape.mesh);
+        self.is_numbered_as(scene) && self.meshes.iter().zip(&scene.shapes).all(same)
+    }
+
+    /// True where triangles have the numbers that they have in a scene.
+    fn is_numbered_as(&self, scene: &Scene) -> bool {
+        let same = |(own, shape): (&Arc<Mesh>, &Shape)| {
+            core::ptr::eq(&**own, &*shape.mesh) || own.triangles == shape.mesh.triangles
+        };
         self.meshes.len() == scene.shapes.len()
             && self.instances == scene.instances
             && self.meshes.iter().zip(&scene.shapes).all(same)
             && self.emitting.iter().zip(&scene.shapes).all(|(e, s)| *e == s.emitter.is_some())
+    }
+
+    /// As [`TriangleBvh::may_lie_along`]; true where there are instances.
+    pub(crate) fn may_lie_along(&self, segment: &AlongSegment) -> bool {
+        !self.placed.is_empty() || self.bvh.triangles().may_lie_along(segment)
     }
 
     /// A triangle, whether of an instance or not.

@@ -100,6 +100,12 @@ impl InstancedBvh {
         self.triangles.bounds().union(&of_instances)
     }
 
+    /// The tree over the triangles that are no instances.
+    #[must_use]
+    pub fn triangles(&self) -> &TriangleBvh {
+        &self.triangles
+    }
+
     /// The first hit along a ray.
     #[must_use]
     #[inline]

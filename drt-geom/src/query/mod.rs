@@ -14,6 +14,7 @@ use self::watertight::{Corners, Crossing, ShearedRay};
 use self::wide::{Visitor, WideTree};
 use crate::Aabb;
 
+mod along;
 mod binary;
 mod block;
 mod boxes;
@@ -37,6 +38,7 @@ mod watertight;
 mod wide;
 mod winding;
 
+pub use along::AlongSegment;
 pub use binary::BvhBuilder;
 pub(crate) use boxes::BoxTree;
 pub use build::BvhError;
@@ -67,6 +69,8 @@ pub struct TriangleBvh {
     blocks: Vec<Block>,
     twins: Vec<Twin>,
     triangle_count: usize,
+    /// As the tree was built.
+    boxes_met: f64,
     builder: BvhBuilder,
     machine: Machine,
 }

@@ -73,6 +73,22 @@ impl WideTree {
         }
     }
 
+    /// The boxes that a random line through the scene meets, in the mean: the sum of their surfaces over that of them all.
+    pub(super) fn boxes_met(&self) -> f64 {
+        let Some(root) = self.nodes.first() else { return 0.0 };
+        let surface = |low: [f32; 3], high: [f32; 3]| {
+            let [x, y, z] = [0, 1, 2].map(|k| f64::from(high[k]) - f64::from(low[k]));
+            x * y + y * z + z * x
+        };
+        let child = |node: &WideNode, place: usize| {
+            let side = |first: usize| [0, 2, 4].map(|k| node.bounds[k + first][place]);
+            if node.children[place] == NO_CHILD { 0.0 } else { surface(side(0), side(1)) }
+        };
+        let all = self.nodes.iter().flat_map(|n| (0..WIDTH).map(move |place| child(n, place)));
+        let whole = root.union();
+        all.sum::<f64>() / surface(whole.min, whole.max)
+    }
+
     /// Shows the visitor every block whose box the query meets, by and large the nearer first.
     #[inline(always)]
     pub(super) fn walk<L: Lanes>(&self, lanes: L, query: impl Query, visitor: &mut impl Visitor) {

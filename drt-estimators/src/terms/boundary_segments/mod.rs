@@ -138,8 +138,11 @@ impl Boundary {
         // Lines along which surfaces intersect come last, and are grazed nowhere.
         let grazed = edges.partition_point(|e| !e.is_intersection());
         let grazed = &edges[..grazed];
-        let weights = has_areas.then(|| AreaWeights::new(world, grazed));
-        let areas = weights.map(|w| EdgeTable::new(grazed, |e| movers.pass(e), |e| w.of(e)));
+        let lit = general.as_ref().filter(|_| has_areas);
+        let areas = lit.map(|general| {
+            let weights = AreaWeights::new(world, grazed);
+            general.reweighted(|e| if e.is_intersection() { 0.0 } else { weights.of(e) })
+        });
         let areas = areas.transpose()?.flatten();
         let camera = &world.camera;
         let in_view = |e: &Edge| e.in_view(camera);
