@@ -101,7 +101,8 @@ impl VertexGradient {
     #[must_use]
     pub fn finish(&self, mesh: &Mesh, smooth: &SmoothNormals) -> Vec<Vec3> {
         let mut positions = self.positions.clone();
-        if !self.normals.is_empty() {
+        // What is seen by its shadow alone has no gradient by its normals.
+        if self.normals.iter().any(|g| *g != Vec3::ZERO) {
             smooth.rates_transposed(mesh, &self.normals, &mut positions);
         }
         positions
