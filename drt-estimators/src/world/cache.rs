@@ -9,9 +9,9 @@ use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::world::geometry::Geometry;
 
-/// Things that depend only on geometry and on which shapes emit, and cost more to make than to compare or to update: trees of triangles, and
-/// tetrahedra inside media. What is taken from here answers as what would be made anew, to the bit; it is kept for
-/// one scene at a time.
+/// Things that depend only on geometry and on which shapes emit, and cost more to make than to compare or to update: trees of
+/// triangles, and tetrahedra inside media. What is taken from here answers as what would be made anew, to the bit; it is kept
+/// for one scene at a time.
 #[derive(Debug, Default)]
 pub struct PreparedCache {
     geometry: Option<Arc<Geometry>>,

@@ -47,7 +47,8 @@ pub(crate) struct Placed {
 }
 
 impl Geometry {
-    /// Prepares the surfaces of a scene, unless `known` has the same; where it has them elsewhere, its tree follows.
+    /// Prepares the surfaces of a scene, unless `known` has the same. Where `known` has the same triangles in other places, its tree
+    /// follows them.
     pub(crate) fn new(scene: &Scene, known: Option<&Arc<Self>>) -> Result<Arc<Self>, Error> {
         if let Some(known) = known.filter(|k| k.is_of(scene)) {
             return Ok(known.clone());

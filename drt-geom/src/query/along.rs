@@ -8,7 +8,8 @@ use super::wide::Visitor;
 use super::{TriangleBvh, Walk};
 use crate::NONE;
 
-/// As many blocks are looked at: around a segment that meets more, looking takes longer than it saves.
+/// The most blocks of triangles that are looked at. A long segment in a fine mesh meets more, and looking at all of them would take
+/// longer than it saves.
 const MOST_BLOCKS: u32 = 64;
 
 /// A segment beside which triangles are looked for that are almost parallel to it.
@@ -50,7 +51,7 @@ impl TriangleBvh {
     }
 }
 
-/// What the planes of triangles are compared with.
+/// The middle and the direction of a segment, which planes of triangles are compared with.
 #[derive(Clone, Copy)]
 struct Plane {
     middle: [f64; 3],

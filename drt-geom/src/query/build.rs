@@ -16,7 +16,7 @@ use crate::{Aabb, Mesh, NONE, is_usable};
 /// Most triangles: blocks of them have 31 bits in the tree.
 const MOST: usize = (1 << 31) - 1;
 
-/// As many times the boxes that a ray meets in a tree that was just built, it may meet in one that followed its triangles.
+/// The most boxes that a ray may meet in a tree that followed its triangles, over those in the tree as it was built.
 const WORN: f64 = 1.25;
 
 /// Why a tree cannot be built.
