@@ -4,6 +4,7 @@ use drt_math::Vec3;
 
 use super::block::{BLOCK, chain};
 use super::lanes::{Array, Lanes, Vector};
+use super::nearest::{cross, dot, sub};
 use super::wide::Visitor;
 use super::{TriangleBvh, Walk};
 use crate::NONE;
@@ -71,12 +72,7 @@ impl Plane {
         number: impl Fn(f64) -> V,
         [a, b, c]: &[[V; 3]; 3],
     ) -> u32 {
-        let (ab, ac) = (sub(*b, *a), sub(*c, *a));
-        let n = [
-            ab[1] * ac[2] - ab[2] * ac[1],
-            ab[2] * ac[0] - ab[0] * ac[2],
-            ab[0] * ac[1] - ab[1] * ac[0],
-        ];
+        let n = cross(sub(*b, *a), sub(*c, *a));
         let nn = dot(n, n);
         let tilt = dot(n, self.along.map(&number));
         let off = dot(n, sub(self.middle.map(&number), *a));
@@ -121,16 +117,6 @@ impl Visitor for Along<'_> {
         *self.found |= self.blocks > MOST_BLOCKS;
         if *self.found { ControlFlow::Break(()) } else { ControlFlow::Continue(self.limit) }
     }
-}
-
-#[inline(always)]
-fn sub<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> [V; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn dot<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> V {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

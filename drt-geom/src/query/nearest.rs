@@ -188,16 +188,16 @@ fn clamp<V: Vector<f64, N>, const N: usize>(zero: V, one: V, x: V) -> V {
 }
 
 #[inline(always)]
-fn sub<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> [V; 3] {
+pub(super) fn sub<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> [V; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-fn dot<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> V {
+pub(super) fn dot<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> V {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-fn cross<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> [V; 3] {
+pub(super) fn cross<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> [V; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
