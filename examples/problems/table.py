@@ -2,7 +2,7 @@
 """Fits the inverse problems and prints how near they come, in how much time.
 
     cargo build --release -p drt-cli
-    python3 examples/problems/table.py [--threads N] [--again] [--pictures FOLDER] [--only NAME...]
+    python3 examples/problems/table.py [--threads N] [--jobs N] [--again] [--pictures FOLDER] [--only NAME...]
 
 Each problem is a folder beside this file. Its make.py, if it has one, makes what the scene needs; the job's pictures are rendered
 (with another seed than any of the fits'), `drt optimize` runs on the job, and a row of a table in Markdown is printed. What is there
@@ -27,6 +27,7 @@ whole process, user and system, reading the scene and writing pictures included.
 """
 
 import argparse
+import concurrent.futures
 import csv
 import dataclasses
 import json
@@ -64,6 +65,7 @@ def arguments():
     parser.add_argument("--only", nargs="+", metavar="NAME", help="these problems; all by default")
     parser.add_argument("--drt", type=pathlib.Path, default=HERE.parents[1] / "target/release/drt", help="the drt binary")
     parser.add_argument("--threads", type=int, default=0, help="threads of each run; all cores by default")
+    parser.add_argument("--jobs", type=int, default=1, help="problems that run at the same time, 1 by default")
     parser.add_argument("--pictures", type=pathlib.Path, help="where to put start, target and result of each as PNG")
     parser.add_argument("--again", action="store_true", help="begin fits anew")
     parser.add_argument("--seed", type=int, help="another seed of the fits; goes with --again")
@@ -95,7 +97,7 @@ class Problem:
             shutil.rmtree(self.run, ignore_errors=True)
         self.run.mkdir(exist_ok=True)
         if (self.folder / "make.py").exists():
-            environment = os.environ | {"DRT": str(self.options.drt)}
+            environment = os.environ | {"DRT": str(self.options.drt), "DRT_THREADS": str(self.options.threads)}
             subprocess.run([sys.executable, str(self.folder / "make.py")], check=True, env=environment)
         generated = self.run / "job.toml"
         self.path = generated if generated.exists() else self.folder / "job.toml"
@@ -166,6 +168,7 @@ class Problem:
         return ", ".join(f"{values[name]:.3g}" for name in self.target) if len(self.target) < 6 else "see params.csv"
 
     def row(self):
+        """The row of the table, and whether the fit arrives."""
         self.make()
         fit = self.fit()
         if self.options.pictures:
@@ -193,8 +196,7 @@ class Problem:
             f"{theirs:.0f} × {self.about.get('iterations', 'not told')}" if theirs else "",
             f"1 / {theirs / each:.0f}" if theirs else "",
         ]
-        print("| " + " | ".join(map(str, cells)) + " |", flush=True)
-        return there <= steps
+        return "| " + " | ".join(map(str, cells)) + " |", there <= steps
 
     def of_first_view(self, what):
         """A picture that the fit left of its first view, of the start, the target, or the result."""
@@ -231,8 +233,12 @@ def main():
     problems = sorted((Problem(name, options) for name in options.only or names), key=order)
     print("| " + " | ".join(HEAD) + " |")
     print("|" + "---|" * len(HEAD))
-    reached = [problem.row() for problem in problems]
-    sys.exit(0 if all(reached) else 1)
+    arrive = True
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        for row, arrives in pool.map(Problem.row, problems):
+            print(row, flush=True)
+            arrive &= arrives
+    sys.exit(0 if arrive else 1)
 
 
 if __name__ == "__main__":

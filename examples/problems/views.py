@@ -10,6 +10,8 @@ import subprocess
 
 DRT = os.environ.get("DRT", str(pathlib.Path(__file__).resolve().parents[2] / "target/release/drt"))
 """The program that renders."""
+THREADS = os.environ.get("DRT_THREADS", "0")
+"""Its threads; 0 for all cores."""
 
 
 def is_newer(file, *others):
@@ -22,7 +24,7 @@ def render(scene, output, spp, defines=(), sensor=None, more=()):
     """Renders a picture to a file, unless a file is there that is newer than the scene."""
     if is_newer(output, scene):
         return
-    words = [DRT, "render", scene, "--quiet", "--seed", "1", "--spp", spp, "--output", output, *more]
+    words = [DRT, "render", scene, "--quiet", "--threads", THREADS, "--seed", "1", "--spp", spp, "--output", output, *more]
     words += ["--sensor", sensor] if sensor else []
     words += [word for name, value in dict(defines).items() for word in ("-D", f"{name}={value}")]
     subprocess.run([str(w) for w in words], check=True)
