@@ -138,6 +138,15 @@ impl Scattering<'_> {
         }
     }
 
+    /// The gradient of [`Scattering::eval`] by the corners of its triangle, as far as these turn and stretch the texture coordinates there;
+    /// `d` has the other derivatives.
+    pub(crate) fn corners(&self, wo: Vec3, wi: Vec3, d: &ScatteringGradient) -> [RgbVec; 3] {
+        match self {
+            Self::Surface(bsdf) => bsdf.corners(wo, wi, [d.wo, d.wi, d.ng]),
+            Self::Volume { .. } => [RgbVec::ZERO; 3],
+        }
+    }
+
     /// The [`RoughnessPartner`] of `wi`, if it has one.
     pub(crate) fn roughness_partner(&self, wo: Vec3, wi: Vec3) -> Option<RoughnessPartner> {
         match self {

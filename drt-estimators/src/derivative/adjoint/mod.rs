@@ -49,7 +49,7 @@ use crate::derivative::sensitivity::{
 };
 use crate::derivative::velocity::{Auxiliary, Probe, TurnPart, TurnParts, VertexVelocity};
 use crate::model::sensor::{Sensor, SensorGradient};
-use crate::model::surface::{BsdfParams, by_corners};
+use crate::model::surface::BsdfParams;
 use crate::sampling::record::Role;
 use crate::sampling::streams::VELOCITY_STREAM;
 use crate::sampling::trace::Endpoint;
@@ -346,8 +346,8 @@ impl<'w> Differentiator<'w> {
                 here.n += d.ng * adjoint;
                 here.slide += d.slide * adjoint;
                 if turns {
-                    let others = [(wo, d.wo), (wi, d.wi), (s.ng, d.ng)];
-                    send_frame(world, s, &others, adjoint, sink);
+                    let corners = world.scattering(v)?.corners(wo, wi, &d);
+                    send_frame(s, corners, adjoint, sink);
                 }
                 if material && let Some(params) = d.params {
                     send_material(world, s, &params, adjoint, sink);
@@ -563,17 +563,14 @@ fn send_material<S: AdjointSink>(
     });
 }
 
-/// Sends what a value owes to the direction that its frame follows, as that of the corners of the triangle.
+/// Sends what a value owes to the corners of its triangle.
 #[cold]
 fn send_frame<S: AdjointSink>(
-    world: &World,
     point: &SurfacePoint,
-    others: &[(Vec3, RgbVec)],
+    corners: [RgbVec; 3],
     adjoint: Rgb,
     sink: &mut S,
 ) {
-    let at = world.texture_point(point);
-    let corners = by_corners(&at, point.ns, others);
     for (by_corner, bary) in corners.into_iter().zip([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) {
         let at = drt_motion::SurfacePoint { triangle: point.triangle, bary };
         let corner = MaterialPoint { shape: point.shape, at };

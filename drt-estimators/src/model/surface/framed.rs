@@ -116,21 +116,32 @@ pub(super) fn pdf(model: &impl Framed, at: At<'_>, from: Vec3, to: Vec3, n: Vec3
 
 /// The gradient of a value by the corners of its triangle, as far as these turn the frame about the normal `n`. `others` are the
 /// vectors that the value depends on but for the normal and the tangent, with its gradient by each.
-///
-/// The tangent is (e₁ Δv₂ - e₂ Δv₁) / (Δu₁ Δv₂ - Δu₂ Δv₁), with the sides e and differences of texture coordinates along them.
 #[cold]
-pub(crate) fn by_corners(at: &TexturePoint<'_>, n: Vec3, others: &[(Vec3, RgbVec)]) -> [RgbVec; 3] {
-    let none = [RgbVec::ZERO; 3];
-    let Some(texcoords) = &at.mesh.texcoords else { return none };
+pub(super) fn by_corners(at: &TexturePoint<'_>, n: Vec3, others: &[(Vec3, RgbVec)]) -> [RgbVec; 3] {
     let along = by_coordinates(at)[0].reject(n);
-    let length2 = along.length_squared();
+    if along.length_squared() == 0.0 {
+        return [RgbVec::ZERO; 3];
+    }
+    of_corners(at, [by_tangent(n, along, others), RgbVec::ZERO])
+}
+
+/// The gradient of a value by the tangent that its frame follows, which is across the normal `n`; `others` as of [`by_corners`].
+pub(super) fn by_tangent(n: Vec3, tangent: Vec3, others: &[(Vec3, RgbVec)]) -> RgbVec {
+    let by_angle = others.iter().fold(Rgb::ZERO, |sum, (w, by)| sum - by.dot(n.cross(*w)));
+    by_angle.outer(n.cross(tangent) * tangent.length_squared().recip())
+}
+
+/// The gradient of a value by the corners of its triangle, from those by the two vectors of [`by_coordinates`]. With the sides e of the triangle and the differences
+/// of texture coordinates along them, these are (e₁ Δv₂ - e₂ Δv₁) / D and (e₂ Δu₁ - e₁ Δu₂) / D, D = Δu₁ Δv₂ - Δu₂ Δv₁.
+pub(super) fn of_corners(at: &TexturePoint<'_>, [by_u, by_v]: [RgbVec; 2]) -> [RgbVec; 3] {
+    let Some(texcoords) = &at.mesh.texcoords else { return [RgbVec::ZERO; 3] };
     let [[u, v], [u1, v1], [u2, v2]] = texcoords[at.triangle as usize];
     let ([u1, v1], [u2, v2]) = ([u1 - u, v1 - v], [u2 - u, v2 - v]);
     let determinant = u1 * v2 - v1 * u2;
-    if length2 == 0.0 || determinant == 0.0 {
-        return none;
+    if determinant == 0.0 {
+        return [RgbVec::ZERO; 3];
     }
-    let by_angle = others.iter().fold(Rgb::ZERO, |sum, (w, by)| sum - by.dot(n.cross(*w)));
-    let by_tangent = by_angle.outer(n.cross(along) * (1.0 / (length2 * determinant)));
-    [v1 - v2, v2, -v1].map(|share| by_tangent * share)
+    let second = (by_u * v2 - by_v * u2) * determinant.recip();
+    let third = (by_v * u1 - by_u * v1) * determinant.recip();
+    [-second - third, second, third]
 }

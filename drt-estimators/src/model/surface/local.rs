@@ -23,6 +23,7 @@
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, RgbVec, Vec3};
 
+use crate::model::surface::framed::by_corners;
 use crate::model::surface::{
     Bend, Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given,
     RoughnessPartner, SpecularSample, SpecularValue,
@@ -30,7 +31,7 @@ use crate::model::surface::{
 use crate::model::texture::TexturePoint;
 
 /// Cosine below which interpolated surfaces fade: 0.0025 % of a sphere's image.
-const FADE: f64 = 0.005;
+pub(super) const FADE: f64 = 0.005;
 
 /// The cosine of a direction behind the shading horizon with the nearest normal that it is in front of.
 const HORIZON: f64 = 1e-12;
@@ -154,9 +155,27 @@ impl LocalBsdf<'_> {
         if !self.bsdf.varies() {
             return RgbVec::ZERO;
         }
-        let factor =
-            if self.interpolated { fade(self.ns.dot(wo)).0 * fade(self.ng.dot(wi)).0 } else { 1.0 };
-        self.bsdf.slide(self.at.as_ref(), [wo, wi, self.ns], params, factor)
+        self.bsdf.slide(self.at.as_ref(), [wo, wi, self.ns], params, self.faded(wo, wi))
+    }
+
+    /// The gradient of the value by the corners of its triangle, as far as these turn and stretch its texture coordinates. It is given
+    /// the gradients by `wo`, by `wi` and by the geometric normal.
+    #[cold]
+    pub(crate) fn corners(
+        &self,
+        wo: Vec3,
+        wi: Vec3,
+        [by_wo, by_wi, by_ng]: [RgbVec; 3],
+    ) -> [RgbVec; 3] {
+        let Some(at) = &self.at else { return [RgbVec::ZERO; 3] };
+        let turned = by_corners(at, self.ns, &[(wo, by_wo), (wi, by_wi), (self.ng, by_ng)]);
+        let stretched = self.bsdf.stretch(Some(at), [wo, wi, self.ns], self.faded(wo, wi));
+        [0, 1, 2].map(|k| turned[k] + stretched[k])
+    }
+
+    /// The factor of the value at interpolated normals.
+    fn faded(&self, wo: Vec3, wi: Vec3) -> f64 {
+        if self.interpolated { fade(self.ns.dot(wo)).0 * fade(self.ng.dot(wi)).0 } else { 1.0 }
     }
 
     /// Draws the direction that is not given; see [`Bsdf::sample`].

@@ -84,7 +84,6 @@ pub use crate::model::surface::dielectric::RoughDielectric;
 pub use crate::model::surface::diffuse::Diffuse;
 pub(crate) use crate::model::surface::direction_partner::{DirectionPartner, Turn};
 use crate::model::surface::facet::Facet;
-pub(crate) use crate::model::surface::framed::by_corners;
 pub(crate) use crate::model::surface::local::{LocalBsdf, agree};
 pub use crate::model::surface::measured::{Measured, MeasuredError, MeasuredTables, Tensor};
 pub use crate::model::surface::microfacet::Distribution;
@@ -345,6 +344,13 @@ impl Bsdf {
         factor: f64,
     ) -> RgbVec {
         each!(self, b => b.slide(at, directions, params, factor))
+    }
+
+    /// The gradient of the value, times a `factor`, by the corners of its triangle, as far as these stretch the texture coordinates on the
+    /// surface.
+    #[cold]
+    fn stretch(&self, at: At<'_>, directions: [Vec3; 3], factor: f64) -> [RgbVec; 3] {
+        each!(self, b => b.stretch(at, directions, factor))
     }
 
     /// The [`RoughnessPartner`] of `wi` as the surface gets rougher, if it has one.

@@ -274,6 +274,12 @@ pub(super) trait Model {
         RgbVec::ZERO
     }
 
+    /// The gradient of the value, times a `factor`, by the corners of its triangle, as far as these stretch the texture coordinates on the
+    /// surface: besides the normal, and [the turn of its frame](crate::model::surface::by_corners).
+    fn stretch(&self, _at: At<'_>, _directions: [Vec3; 3], _factor: f64) -> [RgbVec; 3] {
+        [RgbVec::ZERO; 3]
+    }
+
     /// Checks what it has from the mesh of a shape.
     fn validate_on(&self, _mesh: &Mesh) -> Result<(), SurfaceError> {
         Ok(())
@@ -293,17 +299,10 @@ pub(super) fn by_duals<const LANES: usize>(
     [wo, wi, n]: [Vec3; 3],
     value: impl Fn(Lanes<COORDINATES>, [Vec3<Dual<f64, LANES>>; 3]) -> Rgb<Dual<f64, LANES>>,
 ) -> BsdfGradient {
-    let variable = |v: Vec3, first: usize| -> Vec3<Dual<f64, LANES>> {
-        let [x, y, z] = v.to_array();
-        [(x, 0), (y, 1), (z, 2)].map(|(v, k)| Dual::variable(v, first + k)).into()
-    };
-    let directions = [variable(wo, 0), variable(wi, 3), variable(n, COORDINATES - 3)];
+    let directions = variables([wo, wi, n]);
     let value = value(Lanes::new(properties), directions);
     let lane = |k: usize| value.map(|c| c.eps[k]);
-    let by = |first: usize| {
-        let axis = |k: usize| lane(first + k);
-        axis(0).outer(Vec3::X) + axis(1).outer(Vec3::Y) + axis(2).outer(Vec3::Z)
-    };
+    let by = |first: usize| gradient_of(|k| lane(first + k));
     let params = BsdfParams::from_ranks(properties, |k| lane(COORDINATES + k));
     BsdfGradient {
         value: value.map(|c| c.re),
@@ -312,6 +311,23 @@ pub(super) fn by_duals<const LANES: usize>(
         n: by(COORDINATES - 3),
         params,
     }
+}
+
+/// Vectors with a lane of dual numbers for each coordinate, from the first lane on.
+#[inline(always)]
+pub(super) fn variables<const LANES: usize, const N: usize>(
+    vectors: [Vec3; N],
+) -> [Vec3<Dual<f64, LANES>>; N] {
+    core::array::from_fn(|i| {
+        let [x, y, z] = vectors[i].to_array();
+        [(x, 0), (y, 1), (z, 2)].map(|(v, k)| Dual::variable(v, 3 * i + k)).into()
+    })
+}
+
+/// The gradient by a vector, from the derivative by each of its coordinates.
+#[inline(always)]
+pub(super) fn gradient_of(by: impl Fn(usize) -> Rgb) -> RgbVec {
+    by(0).outer(Vec3::X) + by(1).outer(Vec3::Y) + by(2).outer(Vec3::Z)
 }
 
 /// The lanes of two directions and the normal.

@@ -179,6 +179,11 @@ impl BsdfParams {
         }
     }
 
+    /// Adds all entries of another.
+    pub(crate) fn add_all(&mut self, other: &Self) {
+        other.properties.iter().for_each(|p| self.add(p, other.get(p)));
+    }
+
     /// All entries times a weight.
     #[inline]
     pub(crate) fn scaled(&self, weight: Rgb) -> Self {

@@ -199,4 +199,10 @@ impl Model for Blend {
         }
         sum
     }
+
+    fn stretch(&self, at: At<'_>, directions: [Vec3; 3], factor: f64) -> [RgbVec; 3] {
+        let weights = self.weights();
+        let [a, b] = [0, 1].map(|i| self.bsdfs[i].stretch(at, directions, factor * weights[i]));
+        [0, 1, 2].map(|k| a[k] + b[k])
+    }
 }

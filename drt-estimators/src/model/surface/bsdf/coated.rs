@@ -424,4 +424,10 @@ impl Model for Coated {
         self.bsdf.slide(at, inside, &params, 1.0)
             * (self.factor(self.sigma_a, [n.dot(wo), n.dot(wi)]) * factor)
     }
+
+    fn stretch(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], factor: f64) -> [RgbVec; 3] {
+        let inside = [self.below(wo, n).w, self.below(wi, n).w, n];
+        let through = self.factor(self.sigma_a, [n.dot(wo), n.dot(wi)]) * factor;
+        self.bsdf.stretch(at, inside, 1.0).map(|by| by * through)
+    }
 }

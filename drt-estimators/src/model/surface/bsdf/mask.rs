@@ -1,5 +1,5 @@
 use drt_geom::edges::Lobes;
-use drt_math::{Real, Rgb, Vec3};
+use drt_math::{Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::bsdf::Composed;
 use crate::model::surface::model::{Flags, Model, Numbers};
@@ -169,5 +169,13 @@ impl Model for Mask {
         }
         let [least, most] = ends_of(self.opacity, property, textures);
         (least <= 0.0 || most >= 1.0).then_some("at 0 and 1 no path goes where light would")
+    }
+
+    fn slide(&self, at: At<'_>, directions: [Vec3; 3], params: &BsdfParams, factor: f64) -> RgbVec {
+        self.bsdf.slide(at, directions, params, factor * self.opaque())
+    }
+
+    fn stretch(&self, at: At<'_>, directions: [Vec3; 3], factor: f64) -> [RgbVec; 3] {
+        self.bsdf.stretch(at, directions, factor * self.opaque())
     }
 }

@@ -1,15 +1,47 @@
+//! Normals by a map.
+//!
+//! # Derivatives
+//!
+//! Let n be the normal of the surface, s and t the axes along it of its frame, and m = s c₁ + t c₂ + n c₃ the normal of the map, of unit length. The
+//! value is f(wo, wi, m) S(n·wi), with the BSDF f and the shadowing S. By `wo` and `wi` it has the derivatives of both factors. By n it
+//! has those of S, and (∂m/∂n)ᵀ ∂f/∂m, where s and t follow n as the frame says: this comes by dual numbers over n. So does the
+//! direction along m that the frame of f follows, by which f has the derivative of [`by_tangent`].
+//!
+//! What the corners of the triangle change besides n is the direction in which u grows, with which s turns about n. As everything that a value depends
+//! on may turn about n together, that derivative follows from the others, as that of any BSDF with a frame does. Heights are also slopes: let a be the length of
+//! ∂x/∂u, and b and c the coordinates of ∂x/∂v along s and t. The normal has the direction of (-h_u c, h_u b - h_v a, a c), which
+//! changes as the surface is [stretched](Model::stretch). Where a vertex [slides](Model::slide) over the surface, c changes by the gradient of the map.
+//! Slopes of heights jump at the borders of texels.
+//!
+//! # Horizons
+//!
+//! Seen from behind its back, a normal is mirrored or scatters nothing, and light that only one of both normals sees does not count. Mitsuba's values jump
+//! there, where no edge is. So the value goes over from one to the other within the last 0.3° ([`FADE`]) before the horizon of m as seen from `wo`; without shadowing, it
+//! fades where light grazes the surface. The shadowing and f itself vanish at both horizons of `wi`.
+
+mod tilt;
+
 use drt_geom::Mesh;
 use drt_geom::edges::Lobes;
 use drt_math::{Dual, Frame, Real, Rgb, RgbVec, Vec3, vec3};
 
 use crate::model::surface::bsdf::Composed;
-use crate::model::surface::model::{Flags, Model, Numbers};
+use crate::model::surface::bsdf::perturbed::tilt::{Facet, Tilt};
+use crate::model::surface::framed::{by_tangent, of_corners};
+use crate::model::surface::model::{COORDINATES, Flags, Model, Numbers, gradient_of, variables};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
-use crate::model::surface::shading_frame::{by_coordinates, is_front, shading_frame};
+use crate::model::surface::shading_frame::{
+    by_coordinates, frames_jump_on, is_front, shading_frame,
+};
 use crate::model::surface::textures::Textures;
-use crate::model::surface::{At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue};
+use crate::model::surface::{
+    At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
+};
 use crate::model::texture::{Texture, TexturePoint};
+
+#[cfg(doc)]
+use crate::model::surface::local::FADE;
 
 /// A BSDF with other normals than those of its surface: Mitsuba's `normalmap` and `bumpmap`.
 ///
@@ -43,111 +75,125 @@ pub enum Perturbation {
     Heights(f64),
 }
 
-/// The surface's frame at a point, and the normal in it.
-struct Tilt<'a> {
-    at: TexturePoint<'a>,
-    frame: Frame,
-    /// In the frame, of any length.
-    normal: Vec3,
+/// A normal that scatters, with the derivatives of its BSDF there.
+struct Part<T> {
+    facet: Facet<T>,
+    /// What the BSDF's value is multiplied by.
+    factor: T,
+    inner: BsdfGradient,
+    /// The derivative of that value by the direction that the BSDF's frame follows.
+    by_tangent: RgbVec,
 }
 
-/// One normal that scatters.
-struct Facet<'a> {
-    point: TexturePoint<'a>,
-    /// What nested frames follow.
-    tangent: Vec3,
-    /// Unit, in the world.
-    normal: Vec3,
-    /// Squared tangent of its angle to the surface's.
-    tan2: f64,
-    surface: Vec3,
-}
-
-impl Tilt<'_> {
-    /// True where the normal faces away from a direction that the surface faces, or the other way round.
-    fn is_invalid_from(&self, w: Vec3) -> bool {
-        let local = self.frame.to_local(w);
-        local.z * local.dot(self.normal) <= 0.0
+impl<const N: usize> Part<Dual<f64, N>> {
+    /// The derivative of the value by a variable that turns the normals: by its lane.
+    fn lane(&self, k: usize) -> Rgb {
+        let [normal, tangent] = [self.facet.normal, self.facet.tangent]
+            .map(|v| vec3(v.x.eps[k], v.y.eps[k], v.z.eps[k]));
+        let turned = self.inner.n.dot(normal) + self.by_tangent.dot(tangent);
+        turned * self.factor.re + self.inner.value * self.factor.eps[k]
     }
 
-    fn facet(&self, mirrored: bool) -> Facet<'_> {
-        let Vec3 { x, y, z } = self.normal;
-        let normal = if mirrored { vec3(-x, -y, z) } else { self.normal };
-        let length = normal.length();
-        let normal = if length > 0.0 { normal * (1.0 / length) } else { Vec3::Z };
-        let along = Vec3::X.reject(normal);
-        let along = if along.max_abs() > 0.0 { along.normalize() } else { Vec3::Y };
-        let cos2 = normal.z * normal.z;
-        Facet {
-            point: self.at,
-            tangent: self.frame.to_world(along),
-            normal: self.frame.to_world(normal),
-            tan2: if cos2 > 0.0 { (1.0 - cos2).max(0.0) / cos2 } else { f64::INFINITY },
-            surface: self.frame.n,
-        }
-    }
-}
-
-impl Facet<'_> {
-    /// The point with the tangent that nested frames follow.
-    fn at(&self) -> TexturePoint<'_> {
-        TexturePoint { tangent: Some(&self.tangent), ..self.point }
-    }
-
-    /// Both normals see the direction from the same side.
-    fn sees(&self, w: Vec3) -> bool {
-        self.normal.dot(w) * self.surface.dot(w) > 0.0
-    }
-
-    /// The factor of light from a direction at a cosine to the surface's normal.
-    fn shadowed<T: Real>(&self, cos: T) -> T {
-        let alpha2 = f64::min(0.125 * self.tan2, 1.0);
-        let tan2 = (cos.squared().recip() - 1.0).max(T::zero());
-        let root = (tan2 * alpha2 + 1.0).sqrt();
-        T::from(2.0) / (root + 1.0)
+    /// The derivative by a vector whose lanes begin at one.
+    fn by(&self, first: usize) -> RgbVec {
+        gradient_of(|k| self.lane(first + k))
     }
 }
 
 impl Perturbed {
-    fn tilt<'a>(&self, at: &TexturePoint<'a>, n: Vec3) -> Tilt<'a> {
-        // Maps tell normals of the front; behind, they are turned over with the surface's.
-        let front = if is_front(at, n) { n } else { -n };
-        let frame = shading_frame(Some(at), front);
-        let normal = match self.perturbation {
-            Perturbation::Normals => {
-                let c = self.map.at_point(at);
-                vec3(c.r, c.g, c.b) * 2.0 - Vec3::splat(1.0)
+    /// The surface's frame. Maps tell normals of the front; behind, they are turned over with the surface's.
+    fn frame<T: Real>(at: &TexturePoint<'_>, n: Vec3<T>) -> Frame<T> {
+        let front = if is_front(at, n.re()) { n } else { -n };
+        Frame { n, ..shading_frame(Some(at), front) }
+    }
+
+    /// The normal in the surface's frame, of any length.
+    fn normal<T: Real>(&self, at: &TexturePoint<'_>, frame: &Frame<T>) -> Vec3<T> {
+        match self.perturbation {
+            Perturbation::Normals => mapped(self.map.at_point(at)).lift(),
+            Perturbation::Heights(_) => {
+                let [by_u, by_v] = by_coordinates(at).map(|by| frame.to_local(by.lift()));
+                self.slanted(at, [by_u.x, by_u.y], [by_v.x, by_v.y])
             }
-            Perturbation::Heights(scale) => {
-                let slopes = self.map.slopes(at.uv());
-                let [by_u, by_v] = by_coordinates(at);
-                let lifted = |by: Vec3, slope: Rgb| by.reject(front) + front * (scale * slope.r);
-                let normal = lifted(by_u, slopes[0]).cross(lifted(by_v, slopes[1]));
-                let side = at.face_normal().dot(normal);
-                frame.to_local(if side < 0.0 { -normal } else { normal })
-            }
-        };
-        Tilt { at: *at, frame: Frame { n, ..frame }, normal }
-    }
-
-    /// The normal that scatters as seen from a direction.
-    fn seen_from<'a>(&self, tilt: &'a Tilt<'_>, w: Vec3) -> Facet<'a> {
-        tilt.facet(self.flip_invalid_normals && tilt.is_invalid_from(w))
-    }
-
-    /// The normals of which, seen from the light, either may scatter.
-    fn either<'a>(&self, tilt: &'a Tilt<'_>) -> ([Facet<'a>; 2], bool) {
-        ([tilt.facet(false), tilt.facet(true)], self.flip_invalid_normals)
-    }
-
-    /// The factor of light from `wi`, and its derivative by the cosine.
-    fn shadowing(&self, facet: &Facet<'_>, wi: Vec3) -> (f64, f64) {
-        if !self.use_shadowing_function {
-            return (1.0, 0.0);
         }
-        let factor = facet.shadowed(Dual::<f64, 1>::variable(facet.surface.dot(wi), 0));
-        (factor.re, factor.eps[0])
     }
+
+    /// The normal of heights on a plane, where the place changes so with u and v.
+    fn slanted<T: Real>(&self, at: &TexturePoint<'_>, by_u: [T; 2], by_v: [T; 2]) -> Vec3<T> {
+        let Perturbation::Heights(scale) = self.perturbation else { return Vec3::Z.lift() };
+        let [h, k] = self.map.slopes(at.uv()).map(|slope| slope.r * scale);
+        let area = by_u[0] * by_v[1] - by_u[1] * by_v[0];
+        let normal = vec3(by_u[1] * k - by_v[1] * h, by_v[0] * h - by_u[0] * k, area);
+        if area.re() < 0.0 { -normal } else { normal }
+    }
+
+    fn tilt<T: Real>(&self, at: &TexturePoint<'_>, n: Vec3<T>) -> Tilt<T> {
+        let frame = Self::frame(at, n);
+        Tilt::new(frame, self.normal(at, &frame))
+    }
+
+    /// The normals that scatter light that leaves to `wo`, each with its share of the value.
+    fn seen_from<T: Real>(&self, tilt: &Tilt<T>, wo: Vec3<T>) -> [Option<(Facet<T>, T)>; 2] {
+        tilt.seen_from(wo, self.flip_invalid_normals)
+    }
+
+    /// The factor of light from `wi`.
+    fn passing<T: Real>(&self, facet: &Facet<T>, wi: Vec3<T>) -> T {
+        if self.use_shadowing_function { facet.shadowed(wi) } else { facet.fading(wi) }
+    }
+
+    /// The normal that scatters light into single directions.
+    fn single(&self, at: &TexturePoint<'_>, n: Vec3, w: Vec3) -> Facet<f64> {
+        let tilt = self.tilt(at, n);
+        if self.flip_invalid_normals && tilt.is_invalid_from(w) {
+            tilt.mirrored()
+        } else {
+            tilt.plain()
+        }
+    }
+
+    /// The normals with the chances by which they are taken to sample from a direction.
+    fn choices(
+        &self,
+        tilt: &Tilt<f64>,
+        from: Vec3,
+        given: Given,
+    ) -> [Option<(Facet<f64>, f64)>; 2] {
+        match (given, self.flip_invalid_normals) {
+            (Given::Wo, true) => self.seen_from(tilt, from),
+            (Given::Wi, true) => [Some((tilt.plain(), 0.5)), Some((tilt.mirrored(), 0.5))],
+            (_, false) => [Some((tilt.plain(), 1.0)), None],
+        }
+    }
+
+    /// The normals that scatter from `wo` to `wi`, with the derivatives of the BSDF at these.
+    fn scattered<T: Real>(
+        &self,
+        at: &TexturePoint<'_>,
+        tilt: &Tilt<T>,
+        [wo, wi]: [Vec3<T>; 2],
+    ) -> impl Iterator<Item = Part<T>> {
+        let parts = self.seen_from(tilt, wo).into_iter().flatten();
+        parts.filter(move |(facet, _)| facet.sees(wi.re())).map(move |(facet, share)| {
+            let (o, i, m, along) = (wo.re(), wi.re(), facet.normal.re(), facet.tangent.re());
+            let inner = facet.with(at, |at| self.bsdf.gradient_at(Some(at), o, i, m));
+            let by_tangent = by_tangent(m, along, &[(o, inner.wo), (i, inner.wi)]);
+            Part { factor: share * self.passing(&facet, wi), facet, inner, by_tangent }
+        })
+    }
+}
+
+#[cfg(test)]
+impl Perturbed {
+    /// The unit normal of the map.
+    pub(in crate::model::surface) fn plain_normal(&self, at: &TexturePoint<'_>, n: Vec3) -> Vec3 {
+        self.tilt(at, n).plain().normal
+    }
+}
+
+/// The normal that a map has.
+fn mapped(Rgb { r, g, b }: Rgb) -> Vec3 {
+    vec3(r, g, b) * 2.0 - Vec3::splat(1.0)
 }
 
 impl Composed for Perturbed {
@@ -166,7 +212,10 @@ impl Model for Perturbed {
 
     #[inline(never)]
     fn flags(&self) -> Flags {
-        Flags { oriented: true, differentiable: false, ..self.bsdf.flags() }
+        let inner = self.bsdf.flags();
+        // What is reflected by a bent mirror moves as no chain of smooth surfaces here tells.
+        let differentiable = inner.differentiable && !inner.smooth && !is_perturbed(&self.bsdf);
+        Flags { oriented: true, differentiable, ..inner }
     }
 
     fn differentiated(&self) -> PropertySet {
@@ -197,53 +246,48 @@ impl Model for Perturbed {
         [wo, wi, n]: [Vec3<T>; 3],
     ) -> Rgb<T> {
         let Some(at) = at else { return self.bsdf.value(numbers, None, [wo, wi, n]) };
-        let tilt = self.tilt(at, n.re());
-        let facet = self.seen_from(&tilt, wo.re());
-        if !facet.sees(wi.re()) {
-            return Rgb::splat(T::zero());
+        let mut sum = Rgb::splat(T::zero());
+        for (facet, share) in self.seen_from(&self.tilt(at, n), wo).into_iter().flatten() {
+            if facet.sees(wi.re()) {
+                let directions = [wo, wi, facet.normal];
+                let value = facet.with(at, |at| self.bsdf.value(numbers, Some(at), directions));
+                sum = sum + value * (share * self.passing(&facet, wi));
+            }
         }
-        let value = self.bsdf.value(numbers, Some(&facet.at()), [wo, wi, facet.normal.lift()]);
-        if !self.use_shadowing_function {
-            return value;
-        }
-        value * facet.shadowed(facet.surface.lift().dot(wi))
+        sum
     }
 
-    /// With respect to the surface's normal there is none: nothing that moves is differentiated here.
     #[inline(never)]
     fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let Some(at) = at else { return self.bsdf.gradient_at(None, wo, wi, n) };
-        let tilt = self.tilt(at, n);
-        let facet = self.seen_from(&tilt, wo);
-        if !facet.sees(wi) {
-            return BsdfGradient::default();
+        let [to, from, normal] = variables::<COORDINATES, 3>([wo, wi, n]);
+        let mut sum = BsdfGradient::default();
+        for part in self.scattered(at, &self.tilt(at, normal), [to, from]) {
+            let scaled = part.inner.scaled(part.factor.re);
+            sum.value += scaled.value;
+            sum.wo += scaled.wo + part.by(0);
+            sum.wi += scaled.wi + part.by(3);
+            sum.n += part.by(6);
+            sum.params.add_all(&scaled.params);
         }
-        let d = self.bsdf.gradient_at(Some(&facet.at()), wo, wi, facet.normal);
-        let (shadowing, by_cos) = self.shadowing(&facet, wi);
-        let mut scaled = d.scaled(shadowing);
-        scaled.wi += (d.value * by_cos).outer(n);
-        scaled.n = RgbVec::ZERO;
-        scaled
+        sum
     }
 
     #[inline(never)]
     fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
         let Some(at) = at else { return self.bsdf.direction(None, from, n, u, given) };
-        let tilt = self.tilt(at, n);
-        let (facet, choice) = match given {
-            Given::Wo => (self.seen_from(&tilt, from), u[2]),
-            Given::Wi => {
-                let ([plain, mirrored], both) = self.either(&tilt);
-                match (both, u[2] < 0.5) {
-                    (false, _) => (plain, u[2]),
-                    (true, true) => (plain, 2.0 * u[2]),
-                    (true, false) => (mirrored, (2.0 * u[2] - 1.0).max(f64::MIN_POSITIVE)),
-                }
+        let mut choice = u[2];
+        for (facet, chance) in self.choices(&self.tilt(at, n), from, given).into_iter().flatten() {
+            if choice >= chance {
+                choice -= chance;
+                continue;
             }
-        };
-        let u = [u[0], u[1], choice];
-        let w = self.bsdf.direction(Some(&facet.at()), from, facet.normal, u, given)?;
-        facet.sees(w).then_some(w)
+            let u = [u[0], u[1], (choice / chance).max(f64::MIN_POSITIVE)];
+            let w =
+                facet.with(at, |at| self.bsdf.direction(Some(at), from, facet.normal, u, given))?;
+            return facet.sees(w).then_some(w);
+        }
+        None
     }
 
     #[inline(never)]
@@ -258,55 +302,54 @@ impl Model for Perturbed {
         let Some(at) = at else {
             return self.bsdf.sample_specular_at(None, from, n, choice, given);
         };
-        let tilt = self.tilt(at, n);
-        let facet = self.seen_from(&tilt, from);
-        let s =
-            self.bsdf.sample_specular_at(Some(&facet.at()), from, facet.normal, choice, given)?;
+        let facet = self.single(at, n, from);
+        let s = facet.with(at, |at| {
+            self.bsdf.sample_specular_at(Some(at), from, facet.normal, choice, given)
+        })?;
         let shadowing = match given {
             _ if !facet.sees(s.w) => 0.0,
-            Given::Wo => self.shadowing(&facet, s.w).0,
-            Given::Wi => self.shadowing(&facet, from).0,
+            Given::Wo => self.passing(&facet, s.w),
+            Given::Wi => self.passing(&facet, from),
         };
         Some(SpecularSample { weight: s.weight * shadowing, ..s })
+    }
+
+    fn single_chance(&self, at: At<'_>, from: Vec3, n: Vec3) -> f64 {
+        let Some(at) = at else { return self.bsdf.single_chance(None, from, n) };
+        let facet = self.single(at, n, from);
+        facet.with(at, |at| self.bsdf.single_chance(Some(at), from, facet.normal))
     }
 
     #[inline(never)]
     fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let Some(at) = at else { return self.bsdf.specular(None, wo, wi, n) };
-        let tilt = self.tilt(at, n);
-        let facet = self.seen_from(&tilt, wo);
-        let found = self.bsdf.specular(Some(&facet.at()), wo, wi, facet.normal)?;
-        let shadowing = if facet.sees(wi) { self.shadowing(&facet, wi).0 } else { 0.0 };
+        let facet = self.single(at, n, wo);
+        let found = facet.with(at, |at| self.bsdf.specular(Some(at), wo, wi, facet.normal))?;
+        let shadowing = if facet.sees(wi) { self.passing(&facet, wi) } else { 0.0 };
         Some(found.scaled(Rgb::splat(shadowing), 1.0))
     }
 
     #[inline(never)]
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
         let Some(at) = at else { return self.bsdf.pdf_at(None, from, to, n, given) };
-        let tilt = self.tilt(at, n);
-        let by = |facet: &Facet<'_>| {
-            if facet.sees(to) {
-                self.bsdf.pdf_at(Some(&facet.at()), from, to, facet.normal, given)
-            } else {
-                0.0
-            }
-        };
-        match given {
-            Given::Wo => by(&self.seen_from(&tilt, from)),
-            Given::Wi => match self.either(&tilt) {
-                ([plain, mirrored], true) => 0.5 * (by(&plain) + by(&mirrored)),
-                ([plain, _], false) => by(&plain),
-            },
-        }
+        let choices = self.choices(&self.tilt(at, n), from, given).into_iter().flatten();
+        let densities = choices.filter(|(facet, _)| facet.sees(to)).map(|(facet, chance)| {
+            let density =
+                facet.with(at, |at| self.bsdf.pdf_at(Some(at), from, to, facet.normal, given));
+            chance * density
+        });
+        densities.sum()
     }
 
     fn lobe_width(&self, at: At<'_>) -> f64 {
         self.bsdf.lobe_width(at)
     }
 
-    /// No sampler asks for it, as nothing that moves is differentiated at such surfaces.
-    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
-        Lobes::even(0.0)
+    /// That of the BSDF about the normal that is seen.
+    fn lobes(&self, at: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let Some(at) = at else { return self.bsdf.lobes(None, wo, n) };
+        let facet = self.single(at, n, wo);
+        facet.with(at, |at| self.bsdf.lobes(Some(at), wo, facet.normal))
     }
 
     fn texture(&self, property: Property) -> Option<&Texture> {
@@ -315,6 +358,58 @@ impl Model for Perturbed {
 
     fn undifferentiated(&self, property: Property, _: Textures<'_>) -> Option<&'static str> {
         self.bsdf.undifferentiated(property)
+    }
+
+    fn slide(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], _: &BsdfParams, factor: f64) -> RgbVec {
+        let Some(at) = at else { return RgbVec::ZERO };
+        let frame = Self::frame(at, n.lift());
+        let own = self.perturbation == Perturbation::Normals;
+        let normal = match own {
+            true => variables::<3, 1>([mapped(self.map.at_point(at))])[0],
+            false => self.normal(at, &frame),
+        };
+        // The map's channels stand for twice their values.
+        let gradient = self.map.gradient(at) * 2.0;
+        let mut sum = RgbVec::ZERO;
+        for part in self.scattered(at, &Tilt::new(frame, normal), [wo.lift(), wi.lift()]) {
+            let within = part.factor.re * factor;
+            let (m, params) =
+                (part.facet.normal.re(), part.inner.params.scaled(Rgb::splat(within)));
+            sum +=
+                part.facet.with(at, |at| self.bsdf.slide(Some(at), [wo, wi, m], &params, within));
+            if own {
+                let by = part.by(0);
+                sum += [(Vec3::X, gradient.r), (Vec3::Y, gradient.g), (Vec3::Z, gradient.b)]
+                    .into_iter()
+                    .fold(RgbVec::ZERO, |sum, (axis, slope)| sum + by.dot(axis).outer(slope))
+                    * factor;
+            }
+        }
+        sum
+    }
+
+    fn stretch(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], factor: f64) -> [RgbVec; 3] {
+        let mut sum = [RgbVec::ZERO; 3];
+        let (Some(at), Perturbation::Heights(_)) = (at, self.perturbation) else { return sum };
+        let frame = Self::frame(at, n);
+        let [u, v] = by_coordinates(at).map(|by| frame.to_local(by));
+        if u.x == 0.0 {
+            return sum;
+        }
+        let [Vec3 { x: a, y: b, z: c }] = variables::<3, 1>([vec3(u.x, v.x, v.y)]);
+        let normal = self.slanted(at, [a, Dual::from(u.y)], [b, c]);
+        let lifted = Frame { s: frame.s.lift(), t: frame.t.lift(), n: n.lift() };
+        for part in self.scattered(at, &Tilt::new(lifted, normal), [wo.lift(), wi.lift()]) {
+            let [by_a, by_b, by_c] = [0, 1, 2].map(|k| part.lane(k) * factor);
+            // The frame turns with u, and so do b and c in it.
+            let turned = (by_b * v.y - by_c * v.x) * (1.0 / u.x);
+            let by_u = by_a.outer(frame.s) + turned.outer(frame.t);
+            let by_v = by_b.outer(frame.s) + by_c.outer(frame.t);
+            for (sum, by) in sum.iter_mut().zip(of_corners(at, [by_u, by_v])) {
+                *sum += by;
+            }
+        }
+        sum
     }
 
     fn validate_on(&self, mesh: &Mesh) -> Result<(), SurfaceError> {
@@ -326,4 +421,15 @@ impl Model for Perturbed {
             }
         }
     }
+
+    fn jumps_on(&self, mesh: &Mesh) -> bool {
+        // Of heights the slopes jump, wherever they are not the same everywhere.
+        let slopes = matches!(self.perturbation, Perturbation::Heights(_));
+        slopes || !self.map.is_continuous_on(mesh) || frames_jump_on(mesh)
+    }
+}
+
+/// True of a BSDF in which there is a map of normals or heights.
+fn is_perturbed(bsdf: &Bsdf) -> bool {
+    matches!(bsdf, Bsdf::Perturbed(_)) || bsdf.parts().any(is_perturbed)
 }

@@ -265,6 +265,10 @@ impl Model for Textured {
         self.slide_of_textures(point, params) + inner
     }
 
+    fn stretch(&self, at: At<'_>, directions: [Vec3; 3], factor: f64) -> [RgbVec; 3] {
+        self.at(at).stretch(at, directions, factor)
+    }
+
     /// Checks what textures have from a mesh.
     fn validate_on(&self, mesh: &Mesh) -> Result<(), SurfaceError> {
         let missing = |t: &&(Property, Texture)| t.1.bounds_on(mesh).is_none();

@@ -179,4 +179,9 @@ impl Model for TwoSided {
         let (bsdf, n) = self.side(wo, n);
         bsdf.slide(at, [wo, wi, n], params, factor)
     }
+
+    fn stretch(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], factor: f64) -> [RgbVec; 3] {
+        let (bsdf, n) = self.side(wo, n);
+        bsdf.stretch(at, [wo, wi, n], factor)
+    }
 }

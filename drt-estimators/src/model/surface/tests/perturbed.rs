@@ -1,6 +1,7 @@
 //! Normals that are not the surface's, and frames that follow texture coordinates.
 
 use drt_geom::{Mesh, procedural};
+use drt_math::RgbVec;
 use drt_math::testing::{SIGNIFICANCE, sphere_chi_square};
 
 use alloc::vec;
@@ -172,4 +173,188 @@ fn slopes_of_heights_tilt_normals() {
     let mirrored = vec3(tilted.x, tilted.y, -tilted.z);
     let expected = 0.5 / core::f64::consts::PI * mirrored.dot(wi).max(0.0);
     assert!((back - expected).abs() < 1e-12, "{back} {expected}");
+}
+
+/// A triangle whose u and v grow along neither of its sides, with a varied map.
+fn slanted() -> Mesh {
+    let frame = Frame::from_normal(normal());
+    let corners = [[0.0, 0.0], [1.0, 0.2], [0.3, 0.9]];
+    let place = |[x, y]: [f64; 2]| frame.to_world(vec3(x, y, 0.0));
+    let mesh = Mesh::new(corners.map(place).to_vec(), vec![[0, 1, 2]]).expect("a mesh");
+    mesh.with_texcoords(vec![[[0.1, 0.3], [0.8, 0.2], [0.4, 0.9]]]).expect("coordinates")
+}
+
+/// Maps of normals and of heights around BSDFs of several kinds, with what is done at horizons in all combinations.
+fn bent() -> Vec<Perturbed> {
+    let texels = [[0.7, 0.4, 0.9], [0.3, 0.8, 0.8], [0.9, 0.6, 0.7], [0.4, 0.2, 0.6]].to_vec();
+    let map = Texture::Bitmap(Bitmap::new([2, 2], texels).expect("an image"));
+    let metal = || Bsdf::RoughConductor(copper(Distribution::Ggx, 0.4));
+    let kinds = [
+        Bsdf::Diffuse(Diffuse::default()),
+        anisotropic(metal(), [0.3, 0.6]),
+        Bsdf::RoughDielectric(glass(Distribution::Ggx, 0.4, 1.5)),
+    ];
+    let mut all = Vec::new();
+    for bsdf in kinds {
+        for perturbation in [Perturbation::Normals, Perturbation::Heights(0.4)] {
+            for [flip_invalid_normals, use_shadowing_function] in [[true, true], [false, false]] {
+                all.push(Perturbed {
+                    bsdf: bsdf.clone(),
+                    map: map.clone(),
+                    perturbation,
+                    flip_invalid_normals,
+                    use_shadowing_function,
+                });
+            }
+        }
+    }
+    all
+}
+
+/// Directions in which a point scatters, some of them where the value goes over from one normal to the other.
+fn bent_pairs(bsdf: &Perturbed, at: &TexturePoint<'_>, count: usize) -> Vec<[Vec3; 2]> {
+    let (n, mut rng) = (normal(), Rng::new(64, 0, 0));
+    let boxed = Bsdf::Perturbed(Box::new(bsdf.clone()));
+    let mut pairs = Vec::new();
+    while pairs.len() < count {
+        let mut wo = random_direction(&mut rng);
+        if pairs.len() % 4 == 0 {
+            // Across the normal of the map, within a third of the angle at which it goes over.
+            let (m, cos) = (bsdf.plain_normal(at, n), 0.0015 * (1.0 + rng.next_f64()));
+            wo = wo.reject(m).normalize() * (1.0 - cos * cos).sqrt() + m * cos;
+        }
+        let Some(drawn) = boxed.sample_at(Some(at), wo, n, random_3d(&mut rng), Given::Wo) else {
+            continue;
+        };
+        let [o, i] = [wo, drawn.w].map(|w| n.dot(w).abs());
+        if o > 0.05 && i > 0.05 && bsdf.plain_normal(at, n).dot(drawn.w).abs() > 0.02 {
+            pairs.push([wo, drawn.w]);
+        }
+    }
+    pairs
+}
+
+/// A slope, with how far two steps of differences agree on it.
+fn slope(f: impl Fn(f64) -> Rgb) -> (Rgb, f64) {
+    let by = |h: f64| (f(h) - f(-h)) * (0.5 / h);
+    let (coarse, fine) = (by(2e-6), by(1e-6));
+    (fine, (fine - coarse).max_abs())
+}
+
+/// Counts how often a wrong value would be seen in place of the right one, which must agree with differences.
+fn agrees(what: &Perturbed, found: Rgb, wrong: Rgb, (expected, error): (Rgb, f64)) -> u32 {
+    let tolerance = 4.0 * error + 1e-5 * (1.0 + expected.max_abs());
+    let off = |found: Rgb| (found - expected).max_abs();
+    assert!(off(found) <= tolerance, "{what:?}: {found:?} {expected:?}");
+    u32::from(off(wrong) > tolerance)
+}
+
+#[test]
+fn bent_normals_have_the_slopes_of_finite_differences() {
+    let (mesh, n, mut rng) = (slanted(), normal(), Rng::new(65, 0, 0));
+    let at = TexturePoint::new(&mesh, 0, [0.3, 0.4]);
+    let mut planted = 0;
+    for what in bent() {
+        let bsdf = Bsdf::Perturbed(Box::new(what.clone()));
+        for [wo, wi] in bent_pairs(&what, &at, 40) {
+            let d = bsdf.gradient_at(Some(&at), wo, wi, n);
+            assert_eq!(d.value, bsdf.eval_at(Some(&at), wo, wi, n));
+            let velocity = [wo, wi, n].map(|w| random_direction(&mut rng).reject(w));
+            let along = |by_n: RgbVec| {
+                d.wo.dot(velocity[0]) + d.wi.dot(velocity[1]) + by_n.dot(velocity[2])
+            };
+            let difference = slope(|h| {
+                let [wo, wi, n] =
+                    [(wo, 0), (wi, 1), (n, 2)].map(|(w, k)| (w + velocity[k] * h).normalize());
+                bsdf.eval_at(Some(&at), wo, wi, n)
+            });
+            planted += agrees(&what, along(d.n), along(RgbVec::ZERO), difference);
+        }
+    }
+    assert!(planted > 300, "normals at rest are seen {planted} times only");
+}
+
+#[test]
+fn bent_normals_turn_and_stretch_with_the_corners_of_their_triangles() {
+    let (mesh, n, mut rng) = (slanted(), normal(), Rng::new(66, 0, 0));
+    let bary = [0.3, 0.4];
+    let at = TexturePoint::new(&mesh, 0, bary);
+    let mut planted = [0; 2];
+    for what in bent() {
+        let bsdf = Bsdf::Perturbed(Box::new(what.clone()));
+        for [wo, wi] in bent_pairs(&what, &at, 40) {
+            let local = bsdf.at(Some(at), n, n, false);
+            let (d, by_ng) = local.gradient(wo, wi);
+            let turned = local.corners(wo, wi, [d.wo, d.wi, by_ng]);
+            let still = bsdf.stretch(Some(&at), [wo, wi, n], 1.0);
+            let velocity = [0; 3].map(|_| random_direction(&mut rng));
+            let along = |g: [RgbVec; 3]| {
+                g.iter().zip(&velocity).fold(Rgb::ZERO, |sum, (g, v)| sum + g.dot(*v))
+            };
+            let difference = slope(|h| {
+                let mut moved = mesh.clone();
+                moved.positions.iter_mut().zip(&velocity).for_each(|(p, v)| *p += *v * h);
+                bsdf.eval_at(Some(&TexturePoint::new(&moved, 0, bary)), wo, wi, n)
+            });
+            let heights = matches!(what.perturbation, Perturbation::Heights(_));
+            let wrong = if heights { along(turned) - along(still) } else { along(still) };
+            planted[usize::from(heights)] += agrees(&what, along(turned), wrong, difference);
+        }
+    }
+    assert!(
+        planted.iter().all(|seen| *seen > 150),
+        "turns and stretches are seen {planted:?} times only"
+    );
+}
+
+#[test]
+fn maps_of_normals_slide_under_points() {
+    let (mesh, n, mut rng) = (slanted(), normal(), Rng::new(67, 0, 0));
+    let bary = [0.3, 0.4];
+    let at = TexturePoint::new(&mesh, 0, bary);
+    let [by_s, by_t] = {
+        let [p, q, r] = mesh.triangle(0);
+        [q - p, r - p]
+    };
+    let mut planted = 0;
+    for what in bent().into_iter().filter(|b| b.perturbation == Perturbation::Normals) {
+        // Also inside of what holds others.
+        let perturbed = Bsdf::Perturbed(Box::new(what.clone()));
+        let masked = Bsdf::Mask(Box::new(Mask { bsdf: perturbed.clone(), opacity: 0.6 }));
+        let mixed = blend(0.3, Bsdf::Diffuse(Diffuse::default()), perturbed.clone());
+        for [wo, wi] in bent_pairs(&what, &at, 20) {
+            for bsdf in [&perturbed, &masked, &mixed] {
+                let d = bsdf.gradient_at(Some(&at), wo, wi, n);
+                let by_place = bsdf.slide(Some(&at), [wo, wi, n], &d.params, 1.0);
+                let [s, t] = [0; 2].map(|_| rng.next_f64() - 0.5);
+                let found = by_place.dot(by_s * s + by_t * t);
+                let difference = slope(|h| {
+                    let bary = [bary[0] + s * h, bary[1] + t * h];
+                    bsdf.eval_at(Some(&TexturePoint::new(&mesh, 0, bary)), wo, wi, n)
+                });
+                planted += agrees(&what, found, Rgb::ZERO, difference);
+            }
+        }
+    }
+    assert!(planted > 200, "maps at rest are seen {planted} times only");
+}
+
+/// Values do not jump where a normal turns its back, as they do without a range in which one goes over to the other.
+#[test]
+fn values_are_continuous_where_normals_turn_away() {
+    let (mesh, n, mut rng) = (slanted(), normal(), Rng::new(68, 0, 0));
+    let at = TexturePoint::new(&mesh, 0, [0.3, 0.4]);
+    for what in bent() {
+        let bsdf = Bsdf::Perturbed(Box::new(what.clone()));
+        let m = what.plain_normal(&at, n);
+        let mut largest = 0.0_f64;
+        for _ in 0..200 {
+            let across = random_direction(&mut rng).reject(m).normalize();
+            let wi = random_direction(&mut rng);
+            let [a, b] = [1e-9, -1e-9].map(|c| bsdf.eval_at(Some(&at), across + m * c, wi, n));
+            assert!((a - b).max_abs() < 1e-5, "{what:?}: {a:?} {b:?}");
+            largest = largest.max(bsdf.eval_at(Some(&at), across + m * 0.01, wi, n).max_abs());
+        }
+        assert!(largest > 0.01, "{what:?}: black");
+    }
 }
