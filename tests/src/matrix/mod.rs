@@ -38,7 +38,7 @@ macro_rules! every_stage {
             lights: spot point_and_sun;
             materials: principled thin brushed pressed coated unmixed measured measured_brushed;
             lenses: thin_lens cropped instances;
-            textures: picture mosaic stained marbled picture_lamp under_a_sky sky_and_slide thrown;
+            textures: picture mosaic stained marbled embossed picture_lamp under_a_sky sky_and_slide thrown;
             media: fog_box blob still_blob shade smoke glass dented_glass sunk_in_fog sunk_glass sunk_lamp beam
                 layers sheet ember;
             deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed

@@ -3,20 +3,24 @@
 use std::sync::Arc;
 
 use drt_estimators::emitter::{Emitter, EnvironmentMap, Slide};
-use drt_estimators::surface::{Bsdf, Diffuse, Property, Textured};
+use drt_estimators::surface::{
+    Bsdf, Diffuse, Perturbation, Perturbed, Property, RoughConductor, Textured,
+};
 use drt_estimators::texture::{
     AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap, VolumeTexture,
 };
+use drt_geom::procedural::uv_sphere;
 use drt_geom::{Mesh, MeshAttribute};
 use drt_math::{Affine, Mat3, Rgb, ValueChange, Vec3, vec3};
 use drt_medium::{Grid, Volume};
-use drt_motion::{Change, Effect, PropertyChange, Texels};
+use drt_motion::{Change, Effect, GeometryChange, PropertyChange, Texels};
 
-use super::effects::{raise, translate, turn};
-use super::materials::panel;
-use super::set::diffuse;
+use super::effects::{grow, raise, translate, turn};
+use super::materials::{panel, with_coordinates};
+use super::set::{at, diffuse};
 use super::{Cell, Stage};
 use crate::Result;
+use crate::motion::moves;
 
 /// What the colours of corners are called.
 const COLOURS: &str = "vertex_colour";
@@ -141,6 +145,68 @@ pub fn marbled() -> Result<Stage> {
     Ok(Stage::new("marbled", scene, cells))
 }
 
+/// Normals of [`image`] up to about 40° from the surface's, or its heights.
+fn bent(bsdf: Bsdf, perturbation: Perturbation) -> Result<Bsdf> {
+    let mut image = image()?.map(|[r, g, _]| match perturbation {
+        Perturbation::Normals => [r, g, 0.85],
+        Perturbation::Heights(_) => [r; 3],
+    })?;
+    image.wrap = TextureWrap::Mirror;
+    Ok(Bsdf::Perturbed(Box::new(Perturbed {
+        bsdf,
+        map: Texture::Bitmap(image),
+        perturbation,
+        flip_invalid_normals: true,
+        use_shadowing_function: true,
+    })))
+}
+
+/// The panel sheared in its own plane, which turns u and v apart.
+fn shears() -> Effect {
+    let velocities = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let along = vec3(0.0, 0.447_213_595_499_958, 0.894_427_190_999_916);
+    let moved = |[x, y]: [f64; 2]| vec3(0.5 * y + 0.3 * x, 0.0, 0.0) + along * (0.4 * x - 0.2 * y);
+    moves("panel", GeometryChange::VertexVelocity(velocities.map(moved).into()))
+}
+
+/// Rough metal with a map of normals, which a panel takes along.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn embossed() -> Result<Stage> {
+    let metal = RoughConductor { alpha: 0.3, ..RoughConductor::default() };
+    let bsdf = bent(Bsdf::RoughConductor(metal), Perturbation::Normals)?;
+    let cells = vec![
+        Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))]),
+        Cell::new("panel turns", [turn("panel", vec3(0.2, 1.0, 0.3), Vec3::ZERO)]).representative(),
+        Cell::new("panel shears", [shears()]).representative(),
+        Cell::new("camera turns", [turn("camera", vec3(0.3, 1.0, 0.4), vec3(0.3, 1.2, -2.6))]),
+    ];
+    Ok(Stage::new("embossed", panel(bsdf)?.scene, cells))
+}
+
+/// A panel with heights, and a ball whose map of normals has an orientation of its own in each triangle.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn engraved() -> Result<Stage> {
+    let bsdf = bent(diffuse([0.7, 0.6, 0.5]), Perturbation::Heights(0.5))?;
+    let ball = with_coordinates(&at(&uv_sphere(8), Vec3::splat(0.35), vec3(-0.3, 0.5, 0.0)))?;
+    let plastered = bent(diffuse([0.4, 0.6, 0.8]), Perturbation::Normals)?;
+    let bulged = |p: &Vec3| vec3(0.6 * p.y, 0.5 * p.x * p.z, p.x - 0.4 * p.y);
+    let bulges = ball.positions.iter().map(bulged).collect();
+    let bulges = moves("ball", GeometryChange::VertexVelocity(bulges));
+    let scene = panel(bsdf)?.shape("ball", ball, plastered).scene;
+    let cells = vec![
+        Cell::new("panel turns", [turn("panel", vec3(0.2, 1.0, 0.3), Vec3::ZERO)]),
+        Cell::new("panel shears", [shears()]).representative(),
+        Cell::new("panel grows", [grow("panel", vec3(1.0, 0.4, 0.4), Vec3::ZERO)]),
+        Cell::new("ball turns", [turn("ball", vec3(0.2, 1.0, 0.3), vec3(-0.3, 0.5, 0.0))]),
+        Cell::new("ball bulges", [bulges]).representative(),
+    ];
+    Ok(Stage::new("engraved", scene, cells))
+}
+
 /// A lamp with a picture before it.
 ///
 /// # Errors
@@ -148,7 +214,7 @@ pub fn marbled() -> Result<Stage> {
 pub fn picture_lamp() -> Result<Stage> {
     let mut scene = panel(diffuse([0.7, 0.6, 0.5]))?.scene;
     let lamp = scene.shapes.iter().position(|s| s.emitter.is_some()).ok_or("no lamp")?;
-    let mesh = super::materials::with_coordinates(&drt_geom::procedural::rectangle())?;
+    let mesh = with_coordinates(&drt_geom::procedural::rectangle())?;
     let mut shape = scene.shapes[lamp].mesh.as_ref().clone();
     shape.texcoords = mesh.texcoords;
     scene.shapes[lamp].mesh = shape.into();

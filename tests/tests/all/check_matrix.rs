@@ -80,6 +80,22 @@ mod through {
     }
 }
 
+/// Maps that jump under points which slide over surfaces; only path space has points that do not.
+mod jumping {
+    use super::{long, short, textures};
+
+    #[test]
+    fn engraved() {
+        short(textures::engraved(), &[]);
+    }
+
+    #[test]
+    #[ignore = "minutes"]
+    fn all() {
+        long(textures::engraved());
+    }
+}
+
 /// Surfaces past which only what moves nothing is differentiated.
 mod past {
     use super::{long, short, still};

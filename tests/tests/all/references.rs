@@ -89,6 +89,12 @@ fn parallel_rays() {
 
 #[test]
 #[ignore = "minutes"]
+fn engraved() {
+    renew(textures::engraved());
+}
+
+#[test]
+#[ignore = "minutes"]
 fn mirrors() {
     renew(still::mirrors());
 }
