@@ -113,7 +113,9 @@ mod tests {
     use crate::model::scene::{Named, SceneSensor, Surrounding};
     use crate::model::sensor::{Lens, Sensor};
     use crate::model::settings::EstimatorKind;
-    use crate::model::surface::{Blend, Dielectric, Perturbation, Perturbed, Property, Textured};
+    use crate::model::surface::{
+        Blend, Conductor, Dielectric, Perturbation, Perturbed, Property, Textured,
+    };
     use crate::model::texture::Texture;
 
     fn blended(bsdf: Bsdf) -> Bsdf {
@@ -172,23 +174,21 @@ mod tests {
         let bleach = [drt_motion::Parameter { name: "bleach".into(), value: 0.0, effects }];
         assert!(crate::Session::new(&scene, &bleach, &crate::Settings::default()).is_ok());
         // BSDFs that nothing is differentiated at, in any estimator.
-        let inner = || Bsdf::Diffuse(Default::default());
         let map = crate::texture::Bitmap::new([1, 1], alloc::vec![[0.5, 0.5, 1.0]]).expect("a map");
-        let perturbed = |perturbation| {
+        let perturbed = |bsdf, perturbation| {
             let map = Texture::Bitmap(map.clone());
             let (flip_invalid_normals, use_shadowing_function) = (true, true);
-            Perturbed {
-                bsdf: inner(),
-                map,
-                perturbation,
-                flip_invalid_normals,
-                use_shadowing_function,
-            }
+            let bent =
+                Perturbed { bsdf, map, perturbation, flip_invalid_normals, use_shadowing_function };
+            Bsdf::Perturbed(alloc::boxed::Box::new(bent))
         };
-        let boxed = |p| Bsdf::Perturbed(alloc::boxed::Box::new(p));
-        for bsdf in
-            [boxed(perturbed(Perturbation::Normals)), boxed(perturbed(Perturbation::Heights(1.0)))]
-        {
+        let mirror = || Bsdf::Conductor(Conductor::default());
+        let twice = perturbed(Bsdf::Diffuse(Default::default()), Perturbation::Heights(1.0));
+        for bsdf in [
+            perturbed(mirror(), Perturbation::Normals),
+            perturbed(mirror(), Perturbation::Heights(1.0)),
+            perturbed(twice, Perturbation::Normals),
+        ] {
             let kind = bsdf.name();
             // Also inside of others.
             for bsdf in [bsdf.clone(), blended(bsdf)] {

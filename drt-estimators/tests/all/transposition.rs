@@ -10,9 +10,10 @@ use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::fit::{Group, GroupKind};
 use drt_estimators::sensor::{Aperture, Lens, Sensor};
 use drt_estimators::surface::{
-    Anisotropic, Bsdf, Conductor, Dielectric, Mask, Measured, MeasuredTables, Principled,
-    RoughConductor,
+    Anisotropic, Bsdf, Conductor, Dielectric, Mask, Measured, MeasuredTables, Perturbation,
+    Perturbed, Principled, RoughConductor,
 };
+use drt_estimators::texture::{Bitmap, Texture};
 use drt_estimators::{
     EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Shape, Unattended, moved,
 };
@@ -284,6 +285,33 @@ fn uneven_materials_everything_at_once() {
         changes("floor", "k", coloured()),
     ]);
     agree("uneven", &scene, effects, &settings());
+}
+
+/// Normals of a map follow the frame, and those of heights the stretch of the coordinates.
+#[test]
+fn bent_normals() {
+    let texels = [[0.7, 0.4, 0.9], [0.3, 0.8, 0.8], [0.9, 0.6, 0.7], [0.4, 0.2, 0.6]].to_vec();
+    let map = Texture::Bitmap(Bitmap::new([2, 2], texels).expect("an image"));
+    for perturbation in [Perturbation::Normals, Perturbation::Heights(0.4)] {
+        let bent = Bsdf::Perturbed(Box::new(Perturbed {
+            bsdf: metal(),
+            map: map.clone(),
+            perturbation,
+            flip_invalid_normals: true,
+            use_shadowing_function: true,
+        }));
+        let scene = with_coordinates(surfaces(diffuse(0.5, 0.6, 0.4), bent));
+        let mut effects = wobbles(&scene);
+        effects.extend([changes("floor", "alpha", grey(0.3)), moves("camera", turn())]);
+        match perturbation {
+            Perturbation::Normals => agree("bent", &scene, effects, &settings()),
+            // The slopes of heights jump, so that only path space has them.
+            Perturbation::Heights(_) => {
+                let (name, exact) = ("engraved", EXACT);
+                by_one_estimator(name, &scene, effects, &settings(), SPP, exact);
+            }
+        }
+    }
 }
 
 #[test]

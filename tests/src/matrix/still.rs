@@ -1,5 +1,4 @@
-//! Stages of surfaces that nothing which moves is differentiated past: smooth ones, masks, maps of normals and heights. What moves
-//! nothing is.
+//! Stages of smooth surfaces, masks, and maps of normals and heights, in which numbers change and nothing moves.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -96,7 +96,7 @@ mod jumping {
     }
 }
 
-/// Surfaces past which only what moves nothing is differentiated.
+/// Smooth surfaces, masks and maps whose numbers change.
 mod past {
     use super::{long, short, still};
 

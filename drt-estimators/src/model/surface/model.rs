@@ -112,8 +112,8 @@ pub(super) struct Flags {
     pub(super) bends: bool,
     /// Directions along the surface are told apart, by its texture coordinates.
     pub(super) oriented: bool,
-    /// The value may be differentiated where something moves: it has no jumps besides those that boundary terms sample, and its
-    /// normals are those of the surface.
+    /// The value may be differentiated where something moves: it has no jumps besides those that boundary terms sample, and is in
+    /// no single direction that a map bends.
     pub(super) differentiable: bool,
 }
 

@@ -86,8 +86,8 @@ impl Bsdf {
         self.flags().oriented
     }
 
-    /// The name of the first BSDF in this one that nothing which moves is differentiated at: it jumps where no term samples it, or its
-    /// normals follow motions in ways that no term knows.
+    /// The name of the first BSDF in this one that nothing which moves is differentiated at: it jumps where no term samples it, or a map
+    /// bends what it reflects into single directions.
     pub(crate) fn undifferentiable(&self) -> Option<&'static str> {
         let lost = !self.flags().differentiable;
         lost.then(|| self.parts().find_map(Self::undifferentiable).unwrap_or(self.name()))
