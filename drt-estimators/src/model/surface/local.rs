@@ -21,17 +21,15 @@
 //! light continuous at both horizons. A ray that is reflected on the inside, at an angle smaller than that of the facets, leaves the body instead.
 
 use drt_geom::edges::Lobes;
-use drt_math::{Real, Rgb, RgbVec, Vec3};
+use drt_math::{Dual, Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::framed::by_corners;
+use crate::model::surface::horizon::fade;
 use crate::model::surface::{
     Bend, Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given,
     RoughnessPartner, SpecularSample, SpecularValue,
 };
 use crate::model::texture::TexturePoint;
-
-/// Cosine below which interpolated surfaces fade: 0.0025 % of a sphere's image.
-pub(super) const FADE: f64 = 0.005;
 
 /// The cosine of a direction behind the shading horizon with the nearest normal that it is in front of.
 const HORIZON: f64 = 1e-12;
@@ -63,12 +61,6 @@ impl Bsdf {
     }
 }
 
-/// The fading factor, and its derivative by the cosine.
-fn fade(cosine: f64) -> (f64, f64) {
-    let c = Real::abs(cosine) / FADE;
-    if c < 1.0 { (c, cosine.signum() / FADE) } else { (1.0, 0.0) }
-}
-
 /// A geometric and a shading normal agree on the side that a direction points to. Normals of which one is the other way round do not count as
 /// disagreeing: there the mesh's corners are listed against its normals.
 pub(crate) fn agree(ng: Vec3, ns: Vec3, w: Vec3) -> bool {
@@ -80,11 +72,7 @@ impl LocalBsdf<'_> {
     #[inline]
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Rgb {
         let value = self.bsdf.eval_at(self.at.as_ref(), wo, wi, self.ns);
-        if self.interpolated {
-            value * (fade(self.ns.dot(wo)).0 * fade(self.ng.dot(wi)).0)
-        } else {
-            value
-        }
+        if self.interpolated { value * self.faded(wo, wi) } else { value }
     }
 
     /// The value with its derivatives, and that by the geometric normal. Of a single direction only the derivatives by the
@@ -97,7 +85,11 @@ impl LocalBsdf<'_> {
         let mut d = self.bsdf.gradient_at(self.at.as_ref(), wo, wi, self.ns);
         let mut by_ng = RgbVec::ZERO;
         if self.interpolated {
-            let ((a, da), (b, db)) = (fade(self.ns.dot(wo)), fade(self.ng.dot(wi)));
+            let by_cosine = |cosine| {
+                let factor = fade(Dual::<f64, 1>::variable(cosine, 0));
+                (factor.re, factor.eps[0])
+            };
+            let ((a, da), (b, db)) = (by_cosine(self.ns.dot(wo)), by_cosine(self.ng.dot(wi)));
             let (factor, by_wo, by_wi) = (a * b, d.value * (da * b), d.value * (a * db));
             d.wo = d.wo * factor + by_wo.outer(self.ns);
             d.n = d.n * factor + by_wo.outer(wo);
@@ -175,7 +167,7 @@ impl LocalBsdf<'_> {
 
     /// The factor of the value at interpolated normals.
     fn faded(&self, wo: Vec3, wi: Vec3) -> f64 {
-        if self.interpolated { fade(self.ns.dot(wo)).0 * fade(self.ng.dot(wi)).0 } else { 1.0 }
+        if self.interpolated { fade(self.ns.dot(wo)) * fade(self.ng.dot(wi)) } else { 1.0 }
     }
 
     /// Draws the direction that is not given; see [`Bsdf::sample`].

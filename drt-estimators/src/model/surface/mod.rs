@@ -43,6 +43,7 @@ mod direction_partner;
 mod facet;
 mod framed;
 mod fresnel;
+mod horizon;
 mod isotropic;
 mod lobes;
 mod local;

@@ -41,7 +41,7 @@ use crate::model::surface::{
 use crate::model::texture::{Texture, TexturePoint};
 
 #[cfg(doc)]
-use crate::model::surface::local::FADE;
+use crate::model::surface::horizon::FADE;
 
 /// A BSDF with other normals than those of its surface: Mitsuba's `normalmap` and `bumpmap`.
 ///
@@ -251,7 +251,7 @@ impl Model for Perturbed {
             if facet.sees(wi.re()) {
                 let directions = [wo, wi, facet.normal];
                 let value = facet.with(at, |at| self.bsdf.value(numbers, Some(at), directions));
-                sum = sum + value * (share * self.passing(&facet, wi));
+                sum += value * (share * self.passing(&facet, wi));
             }
         }
         sum

@@ -1,6 +1,6 @@
 use drt_math::{Frame, Real, Vec3, vec3};
 
-use crate::model::surface::local::FADE;
+use crate::model::surface::horizon::{FADE, fade};
 use crate::model::texture::TexturePoint;
 
 /// The frame of a surface at a point, and the normal of a map there.
@@ -69,8 +69,7 @@ impl<T: Real> Tilt<T> {
     /// mirrored one, if it `flips`, and to nothing otherwise.
     pub(super) fn seen_from(&self, wo: Vec3<T>, flips: bool) -> [Option<(Facet<T>, T)>; 2] {
         let cos = self.facing(wo);
-        let within = cos.abs().re() < FADE;
-        let share = if within { cos.abs() / FADE } else { T::one() };
+        let (within, share) = (cos.abs().re() < FADE, fade(cos));
         match (flips, cos.re() > 0.0) {
             (false, _) => [Some((self.plain(), share)), None],
             (true, false) => [None, Some((self.mirrored(), T::one()))],
@@ -113,6 +112,6 @@ impl<T: Real> Facet<T> {
 
     /// The factor that fades light which grazes the surface.
     pub(super) fn fading(&self, wi: Vec3<T>) -> T {
-        (self.surface.dot(wi).abs() / FADE).min(T::one())
+        fade(self.surface.dot(wi))
     }
 }
