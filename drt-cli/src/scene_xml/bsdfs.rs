@@ -1,8 +1,8 @@
 //! Surface scattering.
 
 mod composed;
+mod legacy;
 mod measured;
-mod past;
 mod principled;
 
 use drt_estimators::surface::{
@@ -46,8 +46,8 @@ impl<'a> Loader<'a> {
             "blendbsdf" => Bsdf::Blend(Box::new(self.blend(&p, parts)?)),
             "normalmap" => Bsdf::Perturbed(Box::new(self.normal_map(&p, parts)?)),
             "coating" | "roughcoating" => Bsdf::Coated(Box::new(self.coated(&p, parts)?)),
-            "roughdiffuse" => Bsdf::RoughDiffuse(past::rough_diffuse(&p)?),
-            "ward" => past::ward(&p)?,
+            "roughdiffuse" => Bsdf::RoughDiffuse(legacy::rough_diffuse(&p)?),
+            "ward" => legacy::ward(&p)?,
             "bumpmap" => Bsdf::Perturbed(Box::new(self.bump_map(&p, parts)?)),
             other => {
                 return Err(e.error(format!(

@@ -6,7 +6,7 @@
 //! samples these terms does not know which estimator it is.
 
 pub(crate) mod emitter_shares;
-mod orthographic;
+mod orthographic_refusals;
 pub(crate) mod path_space;
 pub(crate) mod radiative;
 pub(crate) mod warped;
@@ -107,7 +107,7 @@ pub(crate) fn prepare(
     // Without anything to differentiate, all are the same.
     let estimator = if changes.active.any() { estimator } else { &PathSpace };
     let terms = estimator.terms(&world, changes)?;
-    orthographic::refuse_cuts(&world, changes)?;
+    orthographic_refusals::refuse_cuts(&world, changes)?;
     Ok(Prepared::new(estimator.name(), world, terms))
 }
 

@@ -19,7 +19,7 @@ use alloc::sync::Arc;
 
 use crate::derivative::medium_motion::Insides;
 use crate::derivative::velocity::{Material, Movers};
-use crate::estimators::orthographic::{self, Film};
+use crate::estimators::orthographic_refusals::{self, Film};
 use crate::estimators::{Changes, Estimator, mirrors};
 use crate::model::error::Error;
 use crate::model::scene::Scene;
@@ -52,7 +52,7 @@ impl Estimator for PathSpace {
 
     fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error> {
         let Changes { active, flux_shapes, settings, .. } = *changes;
-        orthographic::refuse(world, changes, Film::InMedium)?;
+        orthographic_refusals::refuse(world, changes, Film::InMedium)?;
         let mut terms = Terms::interior(Arc::new(Material::new(Movers::new(active))));
         if active.moves_geometry() {
             terms.boundary = Boundary::new(world, active)?;

@@ -1,7 +1,7 @@
 //! The interior term, and the plain forward image: one pixel sample at a time.
 
 mod component;
-mod grazing;
+mod grazing_paths;
 mod probe;
 mod recorder;
 
@@ -12,7 +12,7 @@ use drt_math::{Rgb, Rng};
 
 pub(crate) use crate::terms::interior::component::Component;
 use crate::terms::interior::component::{Traced, Worker};
-pub(crate) use crate::terms::interior::grazing::GrazingPaths;
+pub(crate) use crate::terms::interior::grazing_paths::GrazingPaths;
 pub(crate) use crate::terms::interior::probe::Probes;
 pub(crate) use crate::terms::interior::recorder::{PathView, Recorder};
 

@@ -12,10 +12,10 @@ use drt_math::{Mat3, Vec3};
 
 use crate::derivative::velocity::{EdgeMatter, RayTurn, TurnPart, TurningRay, Weight};
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
-use crate::estimators::warped::beside::Beside;
+use crate::estimators::warped::angular_distance::Beside;
 use crate::estimators::warped::edge::{TurningEdge, is_untracked};
-use crate::estimators::warped::held::{self, Border, Found};
-use crate::estimators::warped::near::Near;
+use crate::estimators::warped::edge_weights::Near;
+use crate::estimators::warped::rates_across::{self, Border, Found};
 use crate::model::scene::{Scene, Shape};
 use crate::world::World;
 use crate::world::vertex::{SurfacePoint, Vertex};
@@ -27,7 +27,7 @@ pub(super) struct Limits {
     pub(super) angle: f64,
     /// The weight, beside 1, of what does not turn.
     pub(super) rest: Weight,
-    /// In place of that, the borders of a pixel, where edges are followed across [alone](super::held).
+    /// In place of that, the borders of a pixel, where edges are followed across [alone](super::rates_across).
     pub(super) borders: Option<[Border; 2]>,
 }
 
@@ -222,7 +222,7 @@ impl TurningEdges {
             all.push(Found { edge, beside: *beside, weight });
         });
         if sum.value > 0.0 {
-            held::turn(ray.viewer.x, ray.dir, &all, borders, parts);
+            rates_across::turn(ray.viewer.x, ray.dir, &all, borders, parts);
         }
         sum
     }

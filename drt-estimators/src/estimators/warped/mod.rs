@@ -102,14 +102,14 @@
 //! directional emitters in scenes with media or null interfaces, where lines of shadow become sheets in the volume, is
 //! left to the path-space estimator where something moves; the plan of a [`Session`](crate::Session) says so.
 
+mod angular_distance;
 mod auxiliary;
-mod behind;
-mod beside;
-mod critical;
+mod behind_chains;
+mod critical_angle;
 mod edge;
+mod edge_weights;
 mod edges;
-mod held;
-mod near;
+mod rates_across;
 mod shadows;
 #[cfg(all(test, feature = "std"))]
 mod tests;
@@ -123,7 +123,7 @@ use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
 use crate::derivative::velocity::blend::curvature;
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
-use crate::estimators::orthographic::{self, Film};
+use crate::estimators::orthographic_refusals::{self, Film};
 use crate::estimators::warped::auxiliary::directions::AuxiliaryDirections;
 use crate::estimators::warped::auxiliary::points::AuxiliaryPoints;
 use crate::estimators::warped::edges::TurningEdges;
@@ -163,7 +163,7 @@ impl Estimator for Warped {
     }
 
     fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error> {
-        orthographic::refuse(world, changes, Film::Turning)?;
+        orthographic_refusals::refuse(world, changes, Film::Turning)?;
         let Changes { active, settings, .. } = *changes;
         let lights = &active.moving_emitters;
         let lists = [&active.shapes, lights, &active.bending];

@@ -1,6 +1,6 @@
 //! Rays that turn with the [shadows](crate::derivative::velocity::ShadowTurn) of points and directions.
 //!
-//! Where a pixel has borders, a ray beside no shadow has the rate T_e that follows edges [across alone](super::held). Beside shadows it has
+//! Where a pixel has borders, a ray beside no shadow has the rate T_e that follows edges [across alone](super::rates_across). Beside shadows it has
 //!
 //! ```text
 //! T = s T_w + (1 - s) T_e,    s = W / (1 + W),
@@ -19,9 +19,9 @@ use drt_math::{Vec3, fm};
 use crate::derivative::velocity::{
     RayTurn, ShadowPart, ShadowPlace, ShadowTurn, TurnParts, TurningRay, Weight,
 };
-use crate::estimators::warped::beside::Beside;
+use crate::estimators::warped::angular_distance::Beside;
+use crate::estimators::warped::edge_weights::{ANGLE, Near};
 use crate::estimators::warped::edges::{Limits, TurningEdges, divide};
-use crate::estimators::warped::near::{ANGLE, Near};
 use crate::model::sensor::Sensor;
 use crate::world::World;
 use crate::world::lights::{LightKind, LightSample};

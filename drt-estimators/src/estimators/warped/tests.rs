@@ -1,8 +1,8 @@
 //! Derivatives without samples of edges are those with them, and what is wrong with a field is found.
 
 mod chains;
-mod held;
 mod levels;
+mod rates_across;
 mod slab;
 
 use alloc::sync::Arc;
@@ -304,9 +304,9 @@ fn rates_rise_gradually_from_outlines() {
     for row in 0..50 {
         for k in 0..6000 {
             let point = [f64::from(k) * 1e-3, f64::from(row) * 0.1];
-            let (pixel, dir) = held::seen_at(&prepared, point);
-            let end = held::asked(&prepared, pixel, dir, |_, ray| Some(ray.end?.shape));
-            let rate = held::rate(&prepared, pixel, dir, c).unwrap_or_default().0;
+            let (pixel, dir) = rates_across::seen_at(&prepared, point);
+            let end = rates_across::asked(&prepared, pixel, dir, |_, ray| Some(ray.end?.shape));
+            let rate = rates_across::rate(&prepared, pixel, dir, c).unwrap_or_default().0;
             if let Some((shape, before)) = last
                 && end == Some(0)
                 && shape == end

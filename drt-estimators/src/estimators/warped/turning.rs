@@ -10,10 +10,10 @@ use crate::derivative::velocity::{
     Auxiliary, Blend, ChainPart, ChainedRay, Found, LinkChange, Probe, RayTurn, Spatial, TurnPart,
     TurnParts, TurningRay, VelocityField, VertexVelocity, Weight,
 };
-use crate::estimators::warped::behind::TurnedBehind;
+use crate::estimators::warped::behind_chains::TurnedBehind;
+use crate::estimators::warped::edge_weights::ANGLE;
 use crate::estimators::warped::edges::{Limits, TurningEdges, divide};
-use crate::estimators::warped::held::Border;
-use crate::estimators::warped::near::ANGLE;
+use crate::estimators::warped::rates_across::Border;
 use crate::estimators::warped::shadows::Flow;
 use crate::model::sensor::Pinhole;
 use crate::sampling::record::CameraRay;

@@ -17,11 +17,11 @@
 //! One vertex of each path queries an edge, so that the cost is linear in path length. The vertex is chosen mostly in
 //! proportion to its throughput times an estimate of the contribution of edges seen from it.
 
-mod choice;
 mod difference;
 mod edge_sampler;
 mod primary;
 mod rate;
+mod reservoir;
 mod vertices;
 
 use alloc::sync::Arc;

@@ -29,7 +29,7 @@
 //! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
 //! are surfaces of this kind, too, with f(+) = 0 and the velocity of the grid for u_Σ.
 
-mod grazing;
+mod grazing_flux;
 mod reservoir;
 
 use alloc::sync::Arc;
@@ -37,7 +37,7 @@ use alloc::sync::Arc;
 use drt_math::Vec3;
 use drt_medium::MediumKind;
 
-pub(crate) use crate::terms::flux::grazing::{Buffers, GrazingFlux};
+pub(crate) use crate::terms::flux::grazing_flux::{Buffers, GrazingFlux};
 pub(crate) use crate::terms::flux::reservoir::{FluxRay, Reservoir};
 
 use crate::derivative::sensitivity::ActiveInputs;

@@ -33,7 +33,7 @@ use core::array::from_fn;
 use drt_math::{Frame, Mat3, Real, Vec3};
 
 use crate::derivative::velocity::{ByU, TurnPart, Weight};
-use crate::estimators::warped::beside::Beside;
+use crate::estimators::warped::angular_distance::Beside;
 use crate::estimators::warped::edge::TurningEdge;
 
 /// The border of a pixel that a ray is beside: its points keep the image point across it.

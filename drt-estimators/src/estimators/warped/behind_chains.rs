@@ -74,10 +74,10 @@ use crate::derivative::velocity::{
     ByU, ChainPart, ChainedRay, Link, LinkChange, Mover, RayBehind, RayByMover, RayByU,
     RayVelocity, TangentPlane, Weight, evened, first_ray, ray_by_movers, rays_by_u,
 };
-use crate::estimators::warped::critical::CriticalAngle;
+use crate::estimators::warped::critical_angle::CriticalAngle;
 use crate::estimators::warped::edge::TurningEdge;
+use crate::estimators::warped::edge_weights::{BEHIND, NARROW};
 use crate::estimators::warped::edges::TurningEdges;
-use crate::estimators::warped::near::{BEHIND, NARROW};
 use crate::model::surface::Bend;
 use crate::world::World;
 use crate::world::vertex::SurfacePoint;

@@ -4,7 +4,7 @@ use drt_geom::edges::Cone;
 use drt_math::{Real, Vec3, fm};
 
 use crate::derivative::velocity::{TangentPlane, TurningRay, Weight};
-use crate::estimators::warped::beside::Beside;
+use crate::estimators::warped::angular_distance::Beside;
 use crate::estimators::warped::edge::{Discontinuity, TurningEdge};
 
 /// Within which angle edges turn a ray, in radians.

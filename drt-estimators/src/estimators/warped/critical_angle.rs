@@ -10,7 +10,7 @@
 //! V = -ḣ g / |g|²,
 //! ```
 //!
-//! h does not change, and neither does what goes like its root. V is added to the sum over the [edges behind the chain](super::behind),
+//! h does not change, and neither does what goes like its root. V is added to the sum over the [edges behind the chain](super::behind_chains),
 //! with the weight
 //!
 //! ```text
