@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use crate::estimators::Estimator;
 use crate::estimators::path_space::PathSpace;
+use crate::model::refusals::Sliding;
 use crate::model::scene::{Scene, Target};
 use crate::model::settings::Settings;
 use crate::world::lights::EmitterMask;
@@ -54,11 +55,13 @@ pub(crate) fn may_move(scene: &Scene, target: Target) -> bool {
     }
 }
 
-/// Whether vertices of paths slide over surfaces as the targets change.
+/// How vertices of paths slide over surfaces as the targets change.
 pub(crate) fn slides(
     estimator: &dyn Estimator,
     scene: &Scene,
+    settings: &Settings,
     targets: impl IntoIterator<Item = Target>,
-) -> bool {
-    estimator.slides() && targets.into_iter().any(|target| may_move(scene, target))
+) -> Sliding {
+    let moves = targets.into_iter().any(|target| may_move(scene, target));
+    if moves { estimator.slides(settings) } else { Sliding::Nowhere }
 }

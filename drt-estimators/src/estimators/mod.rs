@@ -18,6 +18,7 @@ use crate::estimators::path_space::PathSpace;
 use crate::estimators::radiative::Radiative;
 use crate::estimators::warped::Warped;
 use crate::model::error::Error;
+use crate::model::refusals::Sliding;
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::sampling::bidirectional::EmissionSampler;
@@ -35,9 +36,8 @@ pub(crate) trait Estimator: Sync {
     /// How the insides of media move by default.
     fn insides(&self) -> Insides;
 
-    /// Whether vertices slide over surfaces as something moves, so that functions of their position there, such as
-    /// textures, have to be continuous.
-    fn slides(&self) -> bool;
+    /// Whether vertices slide over surfaces as something moves, and over what.
+    fn slides(&self, settings: &Settings) -> Sliding;
 
     /// Whether its terms include the light of point, spot and directional emitters where something moves.
     fn takes_delta_lights(&self, scene: &Scene, settings: &Settings) -> bool;

@@ -22,6 +22,7 @@ use crate::derivative::velocity::{Material, Movers};
 use crate::estimators::orthographic_refusals::{self, Film};
 use crate::estimators::{Changes, Estimator, mirrors};
 use crate::model::error::Error;
+use crate::model::refusals::Sliding;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
 use crate::terms::boundary_segments::{Boundary, Strategy};
@@ -42,8 +43,8 @@ impl Estimator for PathSpace {
         Insides::Follow
     }
 
-    fn slides(&self) -> bool {
-        false
+    fn slides(&self, _: &Settings) -> Sliding {
+        Sliding::Nowhere
     }
 
     fn takes_delta_lights(&self, _: &Scene, _: &Settings) -> bool {

@@ -31,6 +31,7 @@ use crate::derivative::velocity::warp::GRAZED;
 use crate::discontinuities::speeds::speeds;
 use crate::estimators::{Changes, Estimator};
 use crate::model::error::Error;
+use crate::model::refusals::Sliding;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
 use crate::terms::boundary_source::BoundarySource;
@@ -59,8 +60,8 @@ impl Estimator for Radiative {
         Insides::Affine
     }
 
-    fn slides(&self) -> bool {
-        true
+    fn slides(&self, _: &Settings) -> Sliding {
+        Sliding::Continuously
     }
 
     fn takes_delta_lights(&self, _: &Scene, _: &Settings) -> bool {

@@ -10,7 +10,7 @@ pub mod filter;
 mod gradient;
 pub(crate) mod image_comparison;
 pub(crate) mod plan;
-mod refusals;
+pub(crate) mod refusals;
 pub(crate) mod rendering;
 pub(crate) mod scene;
 pub mod sensor;

@@ -1,11 +1,25 @@
 //! Derivatives that are refused: where something moves, and light jumps or turns in ways that no term here samples.
 
+use alloc::vec::Vec;
+
 use drt_geom::Mesh;
 
 use crate::model::emitter::Emitter;
 use crate::model::error::{ElementError, Error};
 use crate::model::scene::{Scene, Shape, Target, unusable};
 use crate::model::surface::Bsdf;
+use crate::model::texture::SurfaceLine;
+
+/// How vertices of paths slide over surfaces as something moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sliding {
+    /// They are points of matter.
+    Nowhere,
+    /// Over functions of their place, such as textures, that are continuous.
+    Continuously,
+    /// Also across lines on surfaces along which such functions jump.
+    AcrossLines,
+}
 
 impl Bsdf {
     /// Why nothing that moves can be differentiated where light meets this on a mesh.
@@ -21,43 +35,56 @@ impl Bsdf {
 
 impl Scene {
     /// Refuses derivatives with respect to `parameter` where `moves`, as something moves, and light meets surfaces at which it
-    /// jumps as no term here samples. Where vertices `slide` over surfaces, jumps of textures move under them, which no term here
-    /// samples, either.
+    /// jumps as no term here samples, and where vertices slide over textures that jump.
     pub(crate) fn refuse_derivatives(
         &self,
         parameter: &str,
         moves: bool,
-        slide: bool,
+        sliding: Sliding,
     ) -> Result<(), Error> {
         for (i, s) in self.shapes.iter().enumerate() {
             let bsdf = &self.bsdfs[s.bsdf].item;
             if moves && let Some(reason) = bsdf.refuses_motion(&s.mesh, parameter) {
                 return Err(unusable(&s.id, "shape", i, reason));
             }
-            if slide && let Some(property) = bsdf.undifferentiated_texture() {
+            if sliding != Sliding::Nowhere
+                && let Some(property) = bsdf.undifferentiated_texture()
+            {
                 let parameter = parameter.into();
                 let reason = ElementError::UndifferentiatedTexture { property, parameter };
                 return Err(unusable(&s.id, "shape", i, reason));
             }
-            let discontinuous = |e: usize| match &self.emitters[e].item.emitter {
-                Emitter::TexturedArea { texture, .. } => !texture.is_continuous_on(&s.mesh),
-                _ => false,
+            let lines = || Some(!self.lines_on(i)?.is_empty());
+            let refused = match sliding {
+                Sliding::Nowhere => false,
+                Sliding::Continuously => lines() != Some(false),
+                // Where normals are interpolated, what lies behind the plane of a facet counts less.
+                Sliding::AcrossLines if bsdf.is_smooth() && s.mesh.normals.is_some() => {
+                    lines() != Some(false)
+                }
+                Sliding::AcrossLines => lines().is_none(),
             };
-            if slide && (bsdf.is_discontinuous_on(&s.mesh) || s.emitter.is_some_and(discontinuous))
-            {
-                let parameter = parameter.into();
-                return Err(unusable(
-                    &s.id,
-                    "shape",
-                    i,
-                    ElementError::DiscontinuousTexture { parameter },
-                ));
+            if refused {
+                let reason = ElementError::DiscontinuousTexture { parameter: parameter.into() };
+                return Err(unusable(&s.id, "shape", i, reason));
             }
         }
         if moves {
             self.refuse_smooth_emitters(parameter)?;
         }
         Ok(())
+    }
+
+    /// The lines on a shape along which what it scatters or emits jumps with its textures; `None` where it may jump elsewhere.
+    pub(crate) fn lines_on(&self, shape: usize) -> Option<Vec<SurfaceLine>> {
+        let shape = &self.shapes[shape];
+        let mut lines = self.bsdfs[shape.bsdf].item.lines_on(&shape.mesh)?;
+        if let Some(e) = shape.emitter
+            && let Emitter::TexturedArea { texture, .. } = &self.emitters[e].item.emitter
+        {
+            lines.extend(texture.lines_on(&shape.mesh)?);
+        }
+        Some(lines)
     }
 
     /// Refuses derivatives of the light that a smooth surface emits by what moves: what the surface reflects moves otherwise.
@@ -126,10 +153,10 @@ mod tests {
     #[test]
     fn smooth_and_textured_surfaces_refuse_derivatives_by_name() {
         let mut scene = scene();
-        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
+        assert!(scene.refuse_derivatives("spin", true, Sliding::Continuously).is_ok());
         scene.bsdfs.push(Named::new("glass", Bsdf::Dielectric(Dielectric::default())));
         // One that no shape has does no harm.
-        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
+        assert!(scene.refuse_derivatives("spin", true, Sliding::Continuously).is_ok());
         let shape = scene.shapes.len() - 1;
         scene.shapes[shape].bsdf = scene.bsdfs.len() - 1;
         let name = scene.name_of(Target::Shape(shape));
@@ -151,7 +178,7 @@ mod tests {
         assert!(message.contains("`spin` moves something"), "{message}");
         // Where vertices slide over surfaces, textures must not jump; their values may change.
         scene.shapes[shape].bsdf = 0;
-        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
+        assert!(scene.refuse_derivatives("spin", true, Sliding::Continuously).is_ok());
         let texture = Texture::Checkerboard {
             colours: [Rgb::splat(0.2), Rgb::splat(0.8)],
             to_uv: crate::texture::UvMap::IDENTITY,
@@ -159,8 +186,9 @@ mod tests {
         let bsdf = scene.bsdfs[0].item.clone();
         let textured = Textured::new(bsdf, alloc::vec![(Property::Reflectance, texture)]);
         scene.bsdfs[0].item = Bsdf::Textured(alloc::boxed::Box::new(textured.expect("a texture")));
-        assert!(scene.refuse_derivatives("spin", true, false).is_ok());
-        let message = scene.refuse_derivatives("spin", true, true).unwrap_err().to_string();
+        assert!(scene.refuse_derivatives("spin", true, Sliding::Nowhere).is_ok());
+        let message =
+            scene.refuse_derivatives("spin", true, Sliding::Continuously).unwrap_err().to_string();
         assert!(message.contains(&name) && message.contains("discontinuous texture"), "{message}");
         let op = drt_motion::ValueChange::Add(Rgb::ONE);
         let change = drt_motion::PropertyChange {

@@ -447,7 +447,7 @@ impl Scene {
     }
 }
 
-pub(super) fn unusable(id: &Option<String>, kind: &str, i: usize, reason: ElementError) -> Error {
+pub(crate) fn unusable(id: &Option<String>, kind: &str, i: usize, reason: ElementError) -> Error {
     Error::Element { element: id.clone().unwrap_or_else(|| alloc::format!("{kind}[{i}]")), reason }
 }
 

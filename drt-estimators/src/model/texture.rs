@@ -1,9 +1,9 @@
 //! Values that vary over surfaces, by texture coordinates or by attributes of their meshes.
 
+mod lines;
 mod texels;
 mod volume;
 
-use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -11,6 +11,7 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::{Affine, Rgb, RgbVec, Vec3, fm};
 
+pub(crate) use crate::model::texture::lines::{SurfaceLine, seams};
 pub(crate) use crate::model::texture::texels::{
     Footprint, TexelChange, TexelTangent, replace_texels,
 };
@@ -463,6 +464,15 @@ impl Texture {
         }
     }
 
+    /// False of a value that changes in jumps alone.
+    pub(crate) fn has_slopes(&self) -> bool {
+        match self {
+            Self::Checkerboard { .. } => false,
+            Self::Bitmap(image) => image.filter == TextureFilter::Bilinear,
+            Self::Attribute(_) | Self::Volume(_) => true,
+        }
+    }
+
     /// False where the value jumps, though coordinates do not.
     #[must_use]
     pub fn is_continuous(&self) -> bool {
@@ -472,29 +482,6 @@ impl Texture {
             Self::Attribute(a) => a.name.starts_with("vertex_"),
             Self::Volume(v) => v.is_continuous(),
         }
-    }
-
-    /// True where the value does not jump on a mesh: at none of the edges that triangles share, either.
-    pub(crate) fn is_continuous_on(&self, mesh: &Mesh) -> bool {
-        if !self.is_continuous() {
-            return false;
-        }
-        let mut sides = BTreeMap::new();
-        (0..mesh.triangles.len() as u32).all(|triangle| {
-            let corners = mesh.triangles[triangle as usize];
-            // Without coordinates of their own, triangles have the same ones from corner to corner.
-            let weights = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-            (0..3).all(|k| {
-                let (i, j) = (k, (k + 1) % 3);
-                let (i, j) = if corners[i] < corners[j] { (i, j) } else { (j, i) };
-                let along = [0.0, 0.381, 0.618, 1.0].map(|w: f64| {
-                    let bary = [0, 1].map(|c| weights[i][c] * (1.0 - w) + weights[j][c] * w);
-                    self.at_point(&TexturePoint::new(mesh, triangle, bary))
-                });
-                let first = *sides.entry([corners[i], corners[j]]).or_insert(along);
-                along.iter().zip(&first).all(|(a, b)| (*a - *b).max_abs() <= 1e-9)
-            })
-        })
     }
 
     /// Values, per channel, between which all others are; of a checkerboard its two colours, of an attribute its mean,

@@ -11,6 +11,7 @@ use crate::derivative::tests::scenes::*;
 use crate::estimators::path_space::PathSpace;
 use crate::estimators::{Changes, Estimator};
 use crate::model::error::Error;
+use crate::model::refusals::Sliding;
 use crate::model::rendering::Estimate;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
@@ -38,8 +39,8 @@ impl Estimator for AtRest {
         Insides::AtRest
     }
 
-    fn slides(&self) -> bool {
-        PathSpace.slides()
+    fn slides(&self, settings: &Settings) -> Sliding {
+        PathSpace.slides(settings)
     }
 
     fn takes_delta_lights(&self, scene: &Scene, settings: &Settings) -> bool {
@@ -64,8 +65,8 @@ impl Estimator for Faulty {
         Insides::AtRest
     }
 
-    fn slides(&self) -> bool {
-        AtRest.slides()
+    fn slides(&self, settings: &Settings) -> Sliding {
+        AtRest.slides(settings)
     }
 
     fn takes_delta_lights(&self, scene: &Scene, settings: &Settings) -> bool {

@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use drt_estimators::surface::{
-    Bsdf, Coating, Conductor, Dielectric, Mask, Plastic, ThinDielectric,
+    Bsdf, Coating, Conductor, Dielectric, Mask, Plastic, Property, Textured, ThinDielectric,
 };
 use drt_geom::Mesh;
 use drt_geom::procedural::{cube, icosphere, rectangle};
@@ -11,7 +11,9 @@ use drt_math::{Rgb, Vec3, vec3};
 
 use super::deforming::sky;
 use super::effects::{grow, raise, translate, turn};
+use super::materials::with_coordinates;
 use super::set::{at, diffuse, placed};
+use super::textures::squares;
 use super::{Cell, Set, Stage};
 use crate::Result;
 
@@ -107,6 +109,34 @@ pub fn panes() -> Result<Stage> {
     let fades = turn("veil", vec3(0.1, 0.9, 0.1), vec3(0.8, -0.1, 1.2));
     cells.push(Cell::new("veil turns", [fades]).step(STEP).representative());
     Ok(stage("panes", set, cells))
+}
+
+/// A block that is seen through a lattice, which is there in squares, and a floor of tiles in a mirror.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn lattice() -> Result<Stage> {
+    let place = vec3(-0.7, 0.1, 1.0);
+    let tiled = |bsdf, property, texture| -> Result<Bsdf> {
+        Ok(Bsdf::Textured(Textured::new(bsdf, vec![(property, texture)])?.into()))
+    };
+    let mask = Bsdf::Mask(Mask { bsdf: diffuse([0.3, 0.7, 0.2]), opacity: 0.5 }.into());
+    let mask = tiled(mask, Property::Opacity, squares([Rgb::splat(0.1), Rgb::ONE]))?;
+    let colours = [[0.8, 0.2, 0.3].into(), [0.1, 0.6, 0.9].into()];
+    let tiles = tiled(diffuse([0.5; 3]), Property::Reflectance, squares(colours))?;
+    let sheet = |size: [f64; 2], axis, angle, at| {
+        let mesh = with_coordinates(&rectangle())?;
+        crate::Result::Ok(placed(&mesh, vec3(size[0], size[1], 1.0), axis, angle, at))
+    };
+    let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 4)?
+        .shape("block", block(0.7, vec3(-0.5, 0.0, -0.8)), diffuse([0.8, 0.3, 0.2]))
+        .shape("lattice", sheet([0.8, 0.9], Vec3::Y, 0.4, place)?, mask)
+        .shape("floor", sheet([1.5, 1.5], Vec3::X, -FRAC_PI_2, vec3(0.8, -0.9, 0.6))?, tiles)
+        .shape("mirror", panel([0.8, 1.0], -0.4, vec3(1.2, 0.0, -0.9)), silver());
+    let mut cells = moving("lattice", place);
+    let turns = turn("floor", vec3(0.1, 0.9, 0.1), vec3(0.8, -0.9, 0.6));
+    cells.push(Cell::new("floor turns", [turns]).step(STEP));
+    Ok(stage("lattice", set, cells))
 }
 
 /// A block behind a slab of glass.

@@ -7,7 +7,7 @@ use drt_estimators::surface::{
     Bsdf, Diffuse, Perturbation, Perturbed, Property, RoughConductor, Textured,
 };
 use drt_estimators::texture::{
-    AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap, VolumeTexture,
+    AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap, UvMap, VolumeTexture,
 };
 use drt_geom::procedural::uv_sphere;
 use drt_geom::{Mesh, MeshAttribute};
@@ -143,6 +143,30 @@ pub fn marbled() -> Result<Stage> {
         Cell::new("panel, turned, turns on", [turns]).at(0.2).samples(1024).representative(),
     ];
     Ok(Stage::new("marbled", scene, cells))
+}
+
+/// A panel of squares, between which its colour jumps.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn tiles() -> Result<Stage> {
+    let squares = squares([[0.8, 0.2, 0.3].into(), [0.1, 0.6, 0.9].into()]);
+    let set = panel(painted(squares)?)?;
+    let cells = vec![
+        Cell::new("panel turns", [turn("panel", vec3(0.2, 1.0, 0.3), Vec3::ZERO)]).representative(),
+        Cell::new("panel shears", [shears()]).representative(),
+        Cell::new("camera turns", [turn("camera", vec3(0.3, 1.0, 0.4), vec3(0.3, 1.2, -2.6))])
+            .step(0.02)
+            .representative(),
+        Cell::new("wall moves", [translate("wall", vec3(0.1, 0.2, -0.3))]),
+    ];
+    Ok(Stage::new("tiles", set.scene, cells))
+}
+
+/// Two by three squares and a bit, askew.
+pub(super) fn squares(colours: [Rgb; 2]) -> Texture {
+    let to_uv = UvMap([[1.1, 0.3, 0.17], [-0.2, 1.4, 0.06]]);
+    Texture::Checkerboard { colours, to_uv }
 }
 
 /// Normals of [`image`] up to about 40° from the surface's, or its heights.

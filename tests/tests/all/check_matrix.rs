@@ -80,9 +80,14 @@ mod through {
     }
 }
 
-/// Maps that jump under points which slide over surfaces; only path space has points that do not.
+/// What jumps under points which slide over surfaces: path space has points that do not, and rays of warped turn with lines of textures.
 mod jumping {
-    use super::{long, short, textures};
+    use super::{Warped, long, short, textures};
+
+    #[test]
+    fn tiles() {
+        short(textures::tiles(), &[Warped.into()]);
+    }
 
     #[test]
     fn engraved() {
@@ -93,6 +98,7 @@ mod jumping {
     #[ignore = "minutes"]
     fn all() {
         long(textures::engraved());
+        long(textures::tiles());
     }
 }
 

@@ -95,6 +95,12 @@ fn engraved() {
 
 #[test]
 #[ignore = "minutes"]
+fn tiles() {
+    renew(textures::tiles());
+}
+
+#[test]
+#[ignore = "minutes"]
 fn mirrors() {
     renew(still::mirrors());
 }

@@ -6,6 +6,7 @@ use drt_math::Vec3;
 
 use crate::derivative::velocity::EdgeMatter;
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::model::texture::SurfaceLine;
 use crate::world::World;
 use crate::world::vertex::MaterialPoint;
 
@@ -70,6 +71,31 @@ impl TurningEdge {
             shape,
             within,
             crease,
+        }
+    }
+
+    /// A line on a surface along which its texture jumps. Where light goes straight through, so does what rays see past it, whatever they end on.
+    pub(super) fn of_texture(world: &World, shape: u32, line: SurfaceLine, moves: bool) -> Self {
+        let SurfaceLine { triangle, ends } = line;
+        let item = &world.scene.shapes[shape as usize];
+        let points = ends
+            .map(|bary| MaterialPoint { shape, at: drt_motion::SurfacePoint { triangle, bary } });
+        let [p, q, r] = item.mesh.triangle(triangle);
+        let ends = ends.map(|[s, t]| p + (q - p) * s + (r - p) * t);
+        let normal = item.mesh.normal(triangle).normalize();
+        let passes = world.scene.bsdfs[item.bsdf].item.passes_straight();
+        Self {
+            ends,
+            half: 0.5 * (ends[1] - ends[0]).length(),
+            points,
+            of_both: None,
+            moves,
+            on_border: world.camera.sees_on_border(ends),
+            facets: false,
+            untracked: false,
+            shape,
+            within: (!passes).then_some(shape),
+            crease: (!passes).then_some(([normal; 2], [true; 2])),
         }
     }
 

@@ -52,18 +52,19 @@ pub(super) struct TurningEdges {
 }
 
 impl TurningEdges {
-    /// Of those that `moves` says to move, and `curved` to be on a curved surface, by its shape.
+    /// Of those that `moves` says to move, and `curved` to be on a curved surface, by its shape; with `lines` along which textures jump.
     pub(super) fn new(
         world: &World,
         edges: &DiscontinuityEdges,
         moves: impl Fn(&DiscontinuityEdge) -> bool,
         curved: impl Fn(u32) -> bool,
+        lines: Vec<TurningEdge>,
     ) -> Self {
-        let list: Vec<_> = edges
+        let of_meshes = edges
             .list
             .iter()
-            .map(|edge| TurningEdge::new(world, edges, edge, moves(edge), curved(edge.edge.shape)))
-            .collect();
+            .map(|edge| TurningEdge::new(world, edges, edge, moves(edge), curved(edge.edge.shape)));
+        let list: Vec<_> = of_meshes.chain(lines).collect();
         let tree = |of: &dyn Fn(&TurningEdge) -> bool| {
             let segments = list.iter().zip(0..).filter(|(edge, _)| of(edge));
             let segment = |(edge, name): (&TurningEdge, u32)| {

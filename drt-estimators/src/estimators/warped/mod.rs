@@ -126,11 +126,13 @@ use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, Discontinuit
 use crate::estimators::orthographic_refusals::{self, Film};
 use crate::estimators::warped::auxiliary::directions::AuxiliaryDirections;
 use crate::estimators::warped::auxiliary::points::AuxiliaryPoints;
+use crate::estimators::warped::edge::TurningEdge;
 use crate::estimators::warped::edges::TurningEdges;
 use crate::estimators::warped::turning::EdgeTurns;
 use crate::estimators::{Changes, Estimator, mirrors};
 use crate::model::error::{ElementError, Error, SettingError};
-use crate::model::scene::Scene;
+use crate::model::refusals::Sliding;
+use crate::model::scene::{Scene, unusable};
 use crate::model::settings::{PathSampling, Settings, Warp};
 use crate::terms::boundary_source::BoundarySource;
 use crate::terms::edge_queries::SeenEdges;
@@ -150,8 +152,11 @@ impl Estimator for Warped {
         Insides::AtRest
     }
 
-    fn slides(&self) -> bool {
-        true
+    fn slides(&self, settings: &Settings) -> Sliding {
+        match settings.warp {
+            Warp::Edges => Sliding::AcrossLines,
+            Warp::Points(_) | Warp::Directions(_) => Sliding::Continuously,
+        }
     }
 
     // What lies behind a connection turns alike for all light that it brings.
@@ -184,7 +189,8 @@ impl Estimator for Warped {
             .map(|s| if lamp(s) { curvature(world, s) } else { spatial.blends.curvature(s) })
             .collect();
         let curved = |shape: u32| curvatures[shape as usize] > 0.0;
-        let edges = TurningEdges::new(world, &found, moves, curved);
+        let lines = if any { texture_lines(world, active)? } else { Vec::new() };
+        let edges = TurningEdges::new(world, &found, moves, curved, lines);
         let mut terms = match settings.warp {
             Warp::Edges => {
                 let field = EdgeTurns::new(world, active, Arc::clone(&spatial), edges);
@@ -223,6 +229,22 @@ impl Estimator for Warped {
         terms.add_light_paths(world, changes);
         Ok(terms)
     }
+}
+
+/// The lines on surfaces along which textures jump. What jumps elsewhere has been refused.
+fn texture_lines(world: &World, active: &ActiveInputs) -> Result<Vec<TurningEdge>, Error> {
+    let mut lines = Vec::new();
+    for (shape, moves) in active.shapes.iter().enumerate() {
+        for line in world.scene.lines_on(shape).unwrap_or_default() {
+            let edge = TurningEdge::of_texture(world, shape as u32, line, *moves);
+            if edge.on_border && (*moves || active.sensor) {
+                let reason = ElementError::TextureAtBorder;
+                return Err(unusable(&world.scene.shapes[shape].id, "shape", shape, reason));
+            }
+            lines.push(edge);
+        }
+    }
+    Ok(lines)
 }
 
 /// Refuses what the kinds of warp cannot do that do not know edges, where `any` edge may move.

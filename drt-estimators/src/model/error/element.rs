@@ -156,13 +156,20 @@ pub enum ElementError {
     FilmCut(String),
     /// A discontinuous texture where points slide over its surface.
     #[error(
-        "it has a discontinuous texture, past which `{parameter}` can only be differentiated by the \
-         estimator path-space, or by finite differences"
+        "it has a discontinuous texture, over which points of the estimator slide: differentiate `{parameter}` by path-space, by \
+         warped (which has no derivative of bump maps, nor of textures of smooth surfaces with interpolated normals), or by finite \
+         differences"
     )]
     DiscontinuousTexture {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
+    /// A texture that jumps along a border of pixels, as the camera sees it.
+    #[error(
+        "its texture jumps along a line that the camera sees exactly along a border of pixels, across which no ray of the \
+         estimator warped turns: move the camera a little, use another filter, the estimator path-space, or finite differences"
+    )]
+    TextureAtBorder,
     /// A texture without derivatives where points slide over its surface.
     #[error(
         "a texture stands for its `{property}`, which has no derivative: past it `{parameter}` can only be \

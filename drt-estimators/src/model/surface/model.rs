@@ -8,6 +8,8 @@
 //! for rough metal, but at most 1.03 times for diffuse, Phong, rough plastic and rough glass. What is made of other BSDFs combines
 //! their gradients, by which those of isotropic ones keep their few lanes.
 
+use alloc::vec::Vec;
+
 use drt_geom::Mesh;
 use drt_geom::edges::Lobes;
 use drt_math::{Dual, Real, Rgb, RgbVec, Vec3};
@@ -17,7 +19,7 @@ use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError};
 use crate::model::surface::textures::Textures;
 use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
-use crate::model::texture::Texture;
+use crate::model::texture::{SurfaceLine, Texture};
 
 /// Turns the numbers of a model's properties into those that its value is computed over.
 pub(crate) trait Numbers<T: Real>: Copy {
@@ -285,9 +287,9 @@ pub(super) trait Model {
         Ok(())
     }
 
-    /// True where its own textures jump on a mesh.
-    fn jumps_on(&self, _mesh: &Mesh) -> bool {
-        false
+    /// The lines on a mesh along which its own textures jump; `None` where they may jump elsewhere.
+    fn lines_on(&self, _mesh: &Mesh) -> Option<Vec<SurfaceLine>> {
+        Some(Vec::new())
     }
 }
 

@@ -1,12 +1,10 @@
 //! Frames whose first axis follows the texture coordinates, as Mitsuba's do.
 
-use alloc::collections::BTreeMap;
-
 use drt_geom::Mesh;
 use drt_math::{Frame, Real, Vec3};
 
 use crate::model::surface::At;
-use crate::model::texture::TexturePoint;
+use crate::model::texture::{SurfaceLine, TexturePoint, seams};
 
 /// The frame about a normal: `s` is the direction in which u grows, made orthogonal to the normal; `t` completes a
 /// right-handed frame on the front of the surface, and is the same on its back, where the normal is turned over.
@@ -48,20 +46,14 @@ pub(super) fn by_coordinates(at: &TexturePoint<'_>) -> [Vec3; 2] {
     }
 }
 
-/// True where u grows in different directions on two triangles whose normals are the same where they meet.
-pub(super) fn frames_jump_on(mesh: &Mesh) -> bool {
-    let direction = |triangle: u32| {
-        by_coordinates(&TexturePoint::new(mesh, triangle, [1.0 / 3.0; 2]))[0].normalize()
+/// The edges at which two triangles meet with the same normals, and on which u grows in different directions.
+pub(super) fn frame_seams(mesh: &Mesh) -> impl Iterator<Item = SurfaceLine> + '_ {
+    let sides = |triangle: u32, _| {
+        let at = TexturePoint::new(mesh, triangle, [1.0 / 3.0; 2]);
+        (by_coordinates(&at)[0].normalize(), mesh.normal(triangle).normalize())
     };
-    let mut sides = BTreeMap::new();
-    (0..mesh.triangles.len() as u32).any(|triangle| {
-        let corners = mesh.triangles[triangle as usize];
-        let own = (direction(triangle), mesh.normal(triangle).normalize());
-        (0..3).any(|k| {
-            let (i, j) = (corners[k], corners[(k + 1) % 3]);
-            let (along, normal) = *sides.entry([i.min(j), i.max(j)]).or_insert(own);
-            let smooth = mesh.normals.is_some() || normal.dot(own.1) > 1.0 - 1e-12;
-            smooth && (along - own.0).max_abs() > 1e-9
-        })
+    seams(mesh, sides, |(along, normal), (other, before)| {
+        let smooth = mesh.normals.is_some() || normal.dot(before) > 1.0 - 1e-12;
+        smooth && (along - other).max_abs() > 1e-9
     })
 }

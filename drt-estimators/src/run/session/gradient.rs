@@ -168,7 +168,7 @@ impl Session {
         let moves = active(scene, wanted).moves_geometry();
         let estimator = in_scene(estimator, scene, moves);
         if let Some(target) = wanted.first() {
-            let slide = slides(estimator, scene, wanted.iter().copied());
+            let slide = slides(estimator, scene, &self.asked, wanted.iter().copied());
             scene.refuse_derivatives(&scene.name_of(*target), moves, slide)?;
             if moves && !estimator.takes_delta_lights(scene, &self.asked) {
                 scene.refuse_delta_lights(&scene.name_of(*target))?;

@@ -77,7 +77,7 @@ impl<'a> Ground<'a> {
         if let Some(name) = tangents.names.first() {
             let moves = self.moves();
             let moving = tangents.targets().filter(|target| tangents.moves(*target));
-            scene.refuse_derivatives(name, moves, slides(estimator, scene, moving))?;
+            scene.refuse_derivatives(name, moves, slides(estimator, scene, settings, moving))?;
             if moves && !estimator.takes_delta_lights(scene, settings) {
                 scene.refuse_delta_lights(name)?;
             }

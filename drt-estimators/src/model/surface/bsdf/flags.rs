@@ -1,11 +1,14 @@
 //! What kind of BSDF one is: what transport asks before it samples one.
 
+use alloc::vec::Vec;
+
 use drt_geom::Mesh;
 
 use crate::model::surface::bsdf::each;
 use crate::model::surface::model::{Dependence, Flags, Model};
-use crate::model::surface::shading_frame::frames_jump_on;
+use crate::model::surface::shading_frame::frame_seams;
 use crate::model::surface::{Bsdf, Property};
+use crate::model::texture::SurfaceLine;
 
 impl Bsdf {
     /// What a model states of itself.
@@ -93,25 +96,32 @@ impl Bsdf {
         lost.then(|| self.parts().find_map(Self::undifferentiable).unwrap_or(self.name()))
     }
 
-    /// The first property whose texture changes the value in ways that have no derivative.
+    /// The first property whose texture changes the value, as a point slides over it, in ways that have no derivative.
     pub(crate) fn undifferentiated_texture(&self) -> Option<Property> {
         match self {
             Self::Textured(b) => {
-                let mut properties = b.textures.iter().map(|(p, _)| *p);
+                // An opacity of 0 or 1 is that of a region, in which it does not change.
+                let sloping =
+                    b.textures.iter().filter(|(p, t)| *p != Property::Opacity && t.has_slopes());
+                let mut properties = sloping.map(|(p, _)| *p);
                 properties.find(|p| self.undifferentiated(*p).is_some())
             }
             _ => self.parts().find_map(Self::undifferentiated_texture),
         }
     }
 
-    /// True where textures jump on a mesh, or frames that follow texture coordinates.
-    pub(crate) fn is_discontinuous_on(&self, mesh: &Mesh) -> bool {
+    /// The lines on a mesh along which textures jump, or frames that follow texture coordinates; `None` where its value may jump elsewhere.
+    pub(crate) fn lines_on(&self, mesh: &Mesh) -> Option<Vec<SurfaceLine>> {
         match self.dependence() {
-            Dependence::Normal => false,
-            Dependence::Frame => self.is_oriented() && frames_jump_on(mesh),
+            Dependence::Normal => Some(Vec::new()),
+            Dependence::Frame if self.is_oriented() => Some(frame_seams(mesh).collect()),
+            Dependence::Frame => Some(Vec::new()),
             Dependence::Point => {
-                each!(self, b => b.jumps_on(mesh))
-                    || self.parts().any(|b| b.is_discontinuous_on(mesh))
+                let mut lines = each!(self, b => b.lines_on(mesh))?;
+                for part in self.parts() {
+                    lines.extend(part.lines_on(mesh)?);
+                }
+                Some(lines)
             }
         }
     }

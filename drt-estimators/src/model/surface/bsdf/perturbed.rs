@@ -21,6 +21,8 @@
 
 mod tilt;
 
+use alloc::vec::Vec;
+
 use drt_geom::Mesh;
 use drt_geom::edges::Lobes;
 use drt_math::{Dual, Frame, Real, Rgb, RgbVec, Vec3, vec3};
@@ -31,14 +33,12 @@ use crate::model::surface::framed::{by_tangent, of_corners};
 use crate::model::surface::model::{COORDINATES, Flags, Model, Numbers, gradient_of, variables};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
-use crate::model::surface::shading_frame::{
-    by_coordinates, frames_jump_on, is_front, shading_frame,
-};
+use crate::model::surface::shading_frame::{by_coordinates, frame_seams, is_front, shading_frame};
 use crate::model::surface::textures::Textures;
 use crate::model::surface::{
     At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
 };
-use crate::model::texture::{Texture, TexturePoint};
+use crate::model::texture::{SurfaceLine, Texture, TexturePoint};
 
 #[cfg(doc)]
 use crate::model::surface::horizon::FADE;
@@ -422,10 +422,14 @@ impl Model for Perturbed {
         }
     }
 
-    fn jumps_on(&self, mesh: &Mesh) -> bool {
-        // Of heights the slopes jump, wherever they are not the same everywhere.
-        let slopes = matches!(self.perturbation, Perturbation::Heights(_));
-        slopes || !self.map.is_continuous_on(mesh) || frames_jump_on(mesh)
+    fn lines_on(&self, mesh: &Mesh) -> Option<Vec<SurfaceLine>> {
+        // Of heights the slopes jump at every texel, and change in between.
+        if self.perturbation != Perturbation::Normals {
+            return None;
+        }
+        let mut lines = self.map.lines_on(mesh)?;
+        lines.extend(frame_seams(mesh));
+        Some(lines)
     }
 }
 

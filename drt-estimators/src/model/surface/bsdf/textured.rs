@@ -17,7 +17,7 @@ use crate::model::surface::{
     At, Bsdf, BsdfChange, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
 };
 use crate::model::texture::{
-    Footprint, TexelChange, TexelError, TexelTangent, Texture, TexturePoint,
+    Footprint, SurfaceLine, TexelChange, TexelError, TexelTangent, Texture, TexturePoint,
 };
 
 /// A one-sided BSDF some of whose properties vary over the surface.
@@ -279,8 +279,9 @@ impl Model for Textured {
         self.check_bounds(|t| t.bounds_on(mesh).unwrap_or_default())
     }
 
-    fn jumps_on(&self, mesh: &Mesh) -> bool {
-        self.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh))
+    fn lines_on(&self, mesh: &Mesh) -> Option<Vec<SurfaceLine>> {
+        let all: Option<Vec<_>> = self.textures.iter().map(|(_, t)| t.lines_on(mesh)).collect();
+        all.map(|lines| lines.concat())
     }
 }
 
