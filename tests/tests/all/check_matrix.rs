@@ -90,6 +90,11 @@ mod jumping {
     }
 
     #[test]
+    fn plastered() {
+        short(textures::plastered(), &[Warped.into()]);
+    }
+
+    #[test]
     fn engraved() {
         short(textures::engraved(), &[]);
     }
@@ -99,6 +104,7 @@ mod jumping {
     fn all() {
         long(textures::engraved());
         long(textures::tiles());
+        long(textures::plastered());
     }
 }
 

@@ -101,6 +101,12 @@ fn tiles() {
 
 #[test]
 #[ignore = "minutes"]
+fn plastered() {
+    renew(textures::plastered());
+}
+
+#[test]
+#[ignore = "minutes"]
 fn mirrors() {
     renew(still::mirrors());
 }

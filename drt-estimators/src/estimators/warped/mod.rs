@@ -67,6 +67,12 @@
 //! between their facets then turn only rays that nearly hit them, and are found in a [tree](drt_geom::edges::ConeTree)
 //! that skips facets which are seen from one side.
 //!
+//! # Textures
+//!
+//! Vertices slide over surfaces, so that radiance jumps where a texture does: along straight lines between texels that are not
+//! interpolated, and at edges at which triangles have other coordinates. Such a line is a crease between two faces of one plane, and counts as
+//! one. Where light goes straight through, what rays see behind the surface jumps there as well, and the line counts as a silhouette.
+//!
 //! # In volumes
 //!
 //! A vertex in a medium is at a fixed distance along its ray, and turns with the ray; so do the points at which the

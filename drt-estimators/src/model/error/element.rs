@@ -166,7 +166,7 @@ pub enum ElementError {
     },
     /// A texture that jumps along a border of pixels, as the camera sees it.
     #[error(
-        "its texture jumps along a line that the camera sees exactly along a border of pixels, across which no ray of the \
+        "its texture is discontinuous along a line that the camera sees exactly along a border of pixels, across which no ray of the \
          estimator warped turns: move the camera a little, use another filter, the estimator path-space, or finite differences"
     )]
     TextureAtBorder,
