@@ -142,7 +142,11 @@ impl PathVelocities {
         };
         let (parts, chained) = (&mut self.turn_parts, &mut self.chain_parts);
         let turn = self.field.turn_with_chain(world, &chain, parts, chained);
-        let Some(turn) = turn else { return };
+        let Some(turn) = turn else {
+            // What turned it before, whatever it would see, does not turn it for what it sees past the chain.
+            self.vertices[first].turn = None;
+            return;
+        };
         self.probe.turning_edges += (turn.parts.len() + turn.chain.len()) as u64;
         let at = self.turns.len() as u32;
         self.turns.push(turn);

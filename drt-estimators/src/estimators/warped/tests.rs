@@ -1,5 +1,6 @@
 //! Derivatives without samples of edges are those with them, and what is wrong with a field is found.
 
+mod ball_lens;
 mod chains;
 mod levels;
 mod rates_across;
@@ -101,7 +102,10 @@ impl VelocityField for Faulty {
         parts: &mut Vec<TurnPart>,
         chained: &mut Vec<ChainPart>,
     ) -> Option<RayTurn> {
-        let turn = self.field.turn_with_chain(world, chain, parts, chained)?;
+        let mut turn = self.field.turn_with_chain(world, chain, parts, chained)?;
+        if let Fault::Divergence = self.fault {
+            turn.gradient = Vec3::ZERO;
+        }
         for part in &mut chained[turn.chain.clone()] {
             match self.fault {
                 Fault::Divergence => part.divergence = Vec3::ZERO,
