@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use drt_estimators::surface::{
     Bsdf, Coating, Conductor, Dielectric, Mask, Plastic, Property, Textured, ThinDielectric,
 };
+use drt_estimators::texture::Texture;
 use drt_geom::Mesh;
 use drt_geom::procedural::{cube, icosphere, rectangle};
 use drt_math::{Rgb, Vec3, vec3};
@@ -111,27 +112,33 @@ pub fn panes() -> Result<Stage> {
     Ok(stage("panes", set, cells))
 }
 
+fn tiled(bsdf: Bsdf, property: Property, texture: Texture) -> Result<Bsdf> {
+    Ok(Bsdf::Textured(Textured::new(bsdf, vec![(property, texture)])?.into()))
+}
+
+fn tiles() -> Result<Bsdf> {
+    let colours = [[0.8, 0.2, 0.3].into(), [0.1, 0.6, 0.9].into()];
+    tiled(diffuse([0.5; 3]), Property::Reflectance, squares(colours))
+}
+
+/// A panel with texture coordinates.
+fn sheet(size: [f64; 2], axis: Vec3, angle: f64, at: Vec3) -> Result<Mesh> {
+    let mesh = with_coordinates(&rectangle())?;
+    Ok(placed(&mesh, vec3(size[0], size[1], 1.0), axis, angle, at))
+}
+
 /// A block that is seen through a lattice, which is there in squares, and a floor of tiles in a mirror.
 ///
 /// # Errors
 /// When the library rejects the scene.
 pub fn lattice() -> Result<Stage> {
     let place = vec3(-0.7, 0.1, 1.0);
-    let tiled = |bsdf, property, texture| -> Result<Bsdf> {
-        Ok(Bsdf::Textured(Textured::new(bsdf, vec![(property, texture)])?.into()))
-    };
     let mask = Bsdf::Mask(Mask { bsdf: diffuse([0.3, 0.7, 0.2]), opacity: 0.5 }.into());
     let mask = tiled(mask, Property::Opacity, squares([Rgb::splat(0.1), Rgb::ONE]))?;
-    let colours = [[0.8, 0.2, 0.3].into(), [0.1, 0.6, 0.9].into()];
-    let tiles = tiled(diffuse([0.5; 3]), Property::Reflectance, squares(colours))?;
-    let sheet = |size: [f64; 2], axis, angle, at| {
-        let mesh = with_coordinates(&rectangle())?;
-        crate::Result::Ok(placed(&mesh, vec3(size[0], size[1], 1.0), axis, angle, at))
-    };
     let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 4)?
         .shape("block", block(0.7, vec3(-0.5, 0.0, -0.8)), diffuse([0.8, 0.3, 0.2]))
         .shape("lattice", sheet([0.8, 0.9], Vec3::Y, 0.4, place)?, mask)
-        .shape("floor", sheet([1.5, 1.5], Vec3::X, -FRAC_PI_2, vec3(0.8, -0.9, 0.6))?, tiles)
+        .shape("floor", sheet([1.5, 1.5], Vec3::X, -FRAC_PI_2, vec3(0.8, -0.9, 0.6))?, tiles()?)
         .shape("mirror", panel([0.8, 1.0], -0.4, vec3(1.2, 0.0, -0.9)), silver());
     let mut cells = moving("lattice", place);
     let turns = turn("floor", vec3(0.1, 0.9, 0.1), vec3(0.8, -0.9, 0.6));
@@ -157,6 +164,21 @@ pub fn slab() -> Result<Stage> {
 /// A ball whose normals are those of a sphere.
 fn ball(radius: f64, place: Vec3) -> Mesh {
     at(&icosphere(3).with_smooth_normals(), Vec3::splat(radius), place)
+}
+
+/// Tiles behind a ball of glass.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn glass_ball() -> Result<Stage> {
+    let pivot = vec3(0.0, 0.0, 1.0);
+    let wall = sheet([1.3, 1.2], Vec3::Y, 0.3, vec3(0.1, 0.0, -0.8))?;
+    let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 6)?
+        .shape("block", wall, tiles()?)
+        .shape("ball", ball(0.9, pivot), glass());
+    let mut cells = moving("ball", vec3(0.3, -0.2, 0.6));
+    cells.push(Cell::new("ball flattens", [grow("ball", vec3(0.4, -0.3, 0.5), pivot)]).step(STEP));
+    Ok(Stage { samples: 4096, ..stage("ball of glass", set, cells) })
 }
 
 /// A block that is seen beside a ball of silver and in it.

@@ -28,4 +28,4 @@ macro_rules! stages {
     };
 }
 
-stages! { mirror varnish panes slab silver_ball lattice }
+stages! { mirror varnish panes slab silver_ball glass_ball lattice }
