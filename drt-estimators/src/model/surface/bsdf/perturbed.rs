@@ -4,8 +4,8 @@
 //!
 //! Let n be the normal of the surface, s and t the axes along it of its frame, and m = s c₁ + t c₂ + n c₃ the normal of the map, of unit length. The
 //! value is f(wo, wi, m) S(n·wi), with the BSDF f and the shadowing S. By `wo` and `wi` it has the derivatives of both factors. By n it
-//! has those of S, and (∂m/∂n)ᵀ ∂f/∂m, where s and t follow n as the frame says: this comes by dual numbers over n. So does the
-//! direction along m that the frame of f follows, by which f has the derivative of [`by_tangent`].
+//! has those of S, and (∂m/∂n)ᵀ ∂f/∂m, where s and t follow n as the frame says: this comes by dual numbers over n. The frame of f
+//! follows a direction across m, which depends on n as well; the derivative of f by that direction is [`by_tangent`].
 //!
 //! What the corners of the triangle change besides n is the direction in which u grows, with which s turns about n. As everything that a value depends
 //! on may turn about n together, that derivative follows from the others, as that of any BSDF with a frame does. Heights are also slopes: let a be the length of
