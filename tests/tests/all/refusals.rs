@@ -55,6 +55,17 @@ fn of(bsdf: Bsdf) -> (Stage, Scene) {
     (stage, scene)
 }
 
+/// A map of the surface's own normals, or of one height.
+fn perturbed(bsdf: Bsdf, perturbation: Perturbation) -> Bsdf {
+    Bsdf::Perturbed(Box::new(Perturbed {
+        bsdf,
+        map: Texture::Bitmap(Bitmap::new([1, 1], vec![[0.5, 0.5, 1.0]]).unwrap()),
+        perturbation,
+        flip_invalid_normals: true,
+        use_shadowing_function: true,
+    }))
+}
+
 #[test]
 fn materials_without_derivatives() {
     // Numbers for a quarter of a turn, too coarse to go on in the next one.
@@ -65,20 +76,10 @@ fn materials_without_derivatives() {
         [5, 9, 5],
     );
     let quarter = Measured::new(tables.unwrap()).unwrap();
-    let inner = || Bsdf::Diffuse(Diffuse::default());
-    let perturbed = |perturbation| {
-        let map = Bitmap::new([1, 1], vec![[0.5, 0.5, 1.0]]).unwrap();
-        Bsdf::Perturbed(Box::new(Perturbed {
-            bsdf: inner(),
-            map: Texture::Bitmap(map),
-            perturbation,
-            flip_invalid_normals: true,
-            use_shadowing_function: true,
-        }))
-    };
+    let mirror = || Bsdf::Conductor(Conductor::default());
     for bsdf in [
-        perturbed(Perturbation::Normals),
-        perturbed(Perturbation::Heights(0.1)),
+        perturbed(mirror(), Perturbation::Normals),
+        perturbed(mirror(), Perturbation::Heights(0.1)),
         Bsdf::Measured(quarter.into()),
     ] {
         let kind = bsdf.name();
@@ -195,18 +196,33 @@ fn frames_without_coordinates() {
 #[test]
 fn textures_that_jump_under_sliding_points() {
     let colours = [Rgb::splat(0.2), Rgb::splat(0.8)];
-    let board = Texture::Checkerboard { colours, to_uv: UvMap::IDENTITY };
-    let bsdf = Bsdf::Diffuse(Diffuse::default());
-    let board = Textured::new(bsdf, vec![(Property::Reflectance, board)]).unwrap();
-    let (stage, board) = of(Bsdf::Textured(Box::new(board)));
+    let board = || Texture::Checkerboard { colours, to_uv: UvMap::IDENTITY };
+    let textured = |bsdf, property| {
+        Bsdf::Textured(Box::new(Textured::new(bsdf, vec![(property, board())]).unwrap()))
+    };
+    let grey = || Bsdf::Diffuse(Diffuse::default());
+    let (stage, squares) = of(textured(grey(), Property::Reflectance));
     let mosaic = textures::mosaic().unwrap().scene;
-    for scene in [&board, &mosaic] {
-        for estimator in [Radiative, Warped] {
-            let message = refusal(scene, &stage, "panel moves", estimator);
-            assert_refused(message, &["panel moves", "panel", "discontinuous texture"]);
+    let refused = ["panel moves", "panel", "discontinuous texture"];
+    for scene in [&squares, &mosaic] {
+        assert_refused(refusal(scene, &stage, "panel moves", Radiative), &refused);
+        assert_refused(by_samples(scene, &stage), &refused);
+        for estimator in [PathSpace, Warped] {
+            assert_eq!(refusal(scene, &stage, "panel moves", estimator), None);
         }
-        assert_eq!(refusal(scene, &stage, "panel moves", PathSpace), None);
     }
+    // Slopes of heights jump everywhere, and lines on smooth surfaces are not followed where normals are interpolated.
+    let (_, bumpy) = of(perturbed(grey(), Perturbation::Heights(0.1)));
+    for estimator in [Radiative, Warped] {
+        assert_refused(refusal(&bumpy, &stage, "panel moves", estimator), &refused);
+    }
+    assert_eq!(refusal(&bumpy, &stage, "panel moves", PathSpace), None);
+    let mask = Bsdf::Mask(Box::new(Mask { bsdf: grey(), opacity: 0.5 }));
+    let (_, mut cut) = of(textured(mask, Property::Opacity));
+    assert_eq!(refusal(&cut, &stage, "panel moves", Warped), None);
+    let mesh = cut.shapes[0].mesh.as_ref().clone().with_smooth_normals();
+    cut.shapes[0].mesh = mesh.into();
+    assert_refused(refusal(&cut, &stage, "panel moves", Warped), &refused);
 }
 
 #[test]
