@@ -36,6 +36,7 @@ SCENES = {
     "knot": 192,
     "crystal": 256,
     "mirror": 96,
+    "tiles": 96,
     "path-space/branches": 128,
     "path-space/bust": 96,
     "path-space/bumpy": 96,
