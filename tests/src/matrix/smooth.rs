@@ -176,8 +176,9 @@ pub fn glass_ball() -> Result<Stage> {
     let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 6)?
         .shape("block", wall, tiles()?)
         .shape("ball", ball(0.9, pivot), glass());
-    let mut cells = moving("ball", vec3(0.3, -0.2, 0.6));
-    cells.push(Cell::new("ball flattens", [grow("ball", vec3(0.4, -0.3, 0.5), pivot)]).step(STEP));
+    // As the ball itself moves, a few rare samples outweigh all others.
+    let mut cells = moving("ball", pivot);
+    cells.retain(|cell| ["block moves", "camera turns"].contains(&&*cell.parameter.name));
     Ok(Stage { samples: 4096, ..stage("ball of glass", set, cells) })
 }
 
