@@ -54,7 +54,7 @@ struct Grid<'a> {
 }
 
 impl Grid<'_> {
-    /// Adds the lines on a mesh; false of too many.
+    /// Adds the lines on a mesh; false where there are too many.
     fn lines_on(&self, mesh: &Mesh, lines: &mut Vec<SurfaceLine>) -> bool {
         for triangle in 0..mesh.triangles.len() as u32 {
             let corners = CORNERS.map(|bary| (self.place)(mesh.texcoord(triangle, bary)));
@@ -62,8 +62,9 @@ impl Grid<'_> {
                 let at = corners.map(|c| c[axis]);
                 let [low, high] = [f64::min, f64::max].map(|f| f(at[0], f(at[1], at[2])));
                 let (first, last) = (fm::ceil(low), fm::floor(high));
-                // More than would fit are not even counted.
-                if last - first > MOST as f64 {
+                // More than would fit are not even counted; nor are those of coordinates that are no numbers.
+                let beyond = last - first;
+                if beyond.is_nan() || beyond > MOST as f64 {
                     return false;
                 }
                 for k in first as i64..=last as i64 {
@@ -239,5 +240,8 @@ mod tests {
         let fine = UvMap([[1e7, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let many = Texture::Checkerboard { colours: [Rgb::ZERO, Rgb::ONE], to_uv: fine };
         assert_eq!(many.lines_on(&sheet(false)), None);
+        let endless = UvMap([[f64::MAX, 0.0, f64::MAX], [0.0, 1.0, 0.0]]);
+        let endless = Texture::Checkerboard { colours: [Rgb::ZERO, Rgb::ONE], to_uv: endless };
+        assert_eq!(endless.lines_on(&sheet(false)), None);
     }
 }
