@@ -11,7 +11,7 @@ import assets  # noqa: E402
 import views  # noqa: E402
 
 HEIGHT = 1.3
-VIEWS, SPP, LEVELS = 40, 256, 5
+VIEWS, SPP, LEVELS = 40, 64, 5
 
 
 def bird(x, y, z):
