@@ -81,38 +81,8 @@ macro_rules! stages {
 
 drt_tests::every_stage!(stages);
 
-#[test]
-#[ignore = "minutes"]
-fn parallel_rays() {
-    renew(lenses::parallel_rays());
-}
-
-#[test]
-#[ignore = "minutes"]
-fn engraved() {
-    renew(textures::engraved());
-}
-
-#[test]
-#[ignore = "minutes"]
-fn tiles() {
-    renew(textures::tiles());
-}
-
-#[test]
-#[ignore = "minutes"]
-fn plastered() {
-    renew(textures::plastered());
-}
-
-#[test]
-#[ignore = "minutes"]
-fn mirrors() {
-    renew(still::mirrors());
-}
-
-#[test]
-#[ignore = "minutes"]
-fn veiled() {
-    renew(still::veiled());
+stages! {
+    lenses: parallel_rays;
+    textures: engraved tiles plastered;
+    still: mirrors veiled;
 }

@@ -1,3 +1,5 @@
+//! The normals of a map at a point, which of them scatter as seen from a direction, and how much light reaches them, over any scalar.
+
 use drt_math::{Frame, Real, Vec3, vec3};
 
 use crate::model::surface::horizon::{FADE, fade};
